@@ -30,18 +30,21 @@ export function fromEuler(roll: number, pitch: number, heading: number): Quatern
   return [cr * cp * ch + sr * sp * sh, sr * cp * ch - cr * sp * sh, cr * sp * ch + sr * cp * sh, cr * cp * sh - sr * sp * ch];
 }
 
-export function inWords(q: Quaternion): string {
+/** `turned`: headings are from that at the entry, and none is from north. */
+export function inWords(q: Quaternion, turned = false): string {
   const [roll, pitch, heading] = euler(q);
   const side = Math.abs(roll) < 0.05 ? "level across" : `${Math.abs(roll).toFixed(1)}° down on the ${roll > 0 ? "right" : "left"}`;
   const nose = Math.abs(pitch) < 0.05 ? "nose level" : `nose ${Math.abs(pitch).toFixed(1)}° ${pitch > 0 ? "up" : "down"}`;
-  return `Heading ${heading.toFixed(1)}°, ${nose}, ${side}.`;
+  const signed = heading > 180 ? heading - 360 : heading;
+  const facing = !turned ? `Heading ${heading.toFixed(1)}°` : Math.abs(signed) < 0.05 ? "Not turned since the entry" : `Turned ${Math.abs(signed).toFixed(1)}° to the ${signed > 0 ? "right" : "left"} since the entry`;
+  return `${facing}, ${nose}, ${side}.`;
 }
 
 // Half the length, width and height of the box, along forward, right, down.
 const SIZE: Vector = [1.0, 0.5, 0.28];
 const HEIGHT = 260;
 
-export function Attitude({ q, at }: { q: Quaternion | null; at?: string }) {
+export function Attitude({ q, at, turned = false }: { q: Quaternion | null; at?: string; turned?: boolean }) {
   const [element, width] = useWidth<HTMLDivElement>();
   const canvas = useRef<HTMLCanvasElement>(null);
   const [turn, setTurn] = useState<[number, number]>([0.45, 0.45]);
@@ -86,8 +89,8 @@ export function Attitude({ q, at }: { q: Quaternion | null; at?: string }) {
       ctx.font = "13px system-ui, sans-serif";
       ctx.fillText(text, p[0] - 5, p[1] + 4);
     };
-    label([1.4, 0, 0.9], "N", color("--soft"));
-    label([0, 1.4, 0.9], "E", color("--soft"));
+    label([1.4, 0, 0.9], turned ? "forward at the entry" : "N", color("--soft"));
+    if (!turned) label([0, 1.4, 0.9], "E", color("--soft"));
     if (!q) return;
     const corner = (a: number, b: number, c: number) => rotate(q, [a * SIZE[0], b * SIZE[1], c * SIZE[2]]);
     const faces: { points: Vector[]; fill: string }[] = [];
@@ -122,7 +125,7 @@ export function Attitude({ q, at }: { q: Quaternion | null; at?: string }) {
     }
   }, [q, turn, width, dark]);
 
-  const words = q ? inWords(q) : "No attitude at this instant.";
+  const words = q ? inWords(q, turned) : "No attitude at this instant.";
   const keys = (event: KeyboardEvent) => {
     const by: Record<string, [number, number]> = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] };
     const change = by[event.key];

@@ -123,6 +123,9 @@ function Arrow({ angle, look }: { angle: number; look: string }) {
   return <g class={look} transform={`rotate(${angle})`}><line x1={0} y1={-92} x2={0} y2={-48} /><path d="M0 -40 L-7 -54 L7 -54 Z" /></g>;
 }
 
+/** Names of the two axes of a path: without a known heading they are those of the vehicle at the entry. */
+export const axesOf = (overGround: boolean): [string, string] => overGround ? ["north", "east"] : ["forward", "right"];
+
 function PathView({ quick, before }: { quick: CrashQuick; before: CrashQuick | null }) {
   const { path, vehicle } = quick;
   const last = path.north.length - 1;
@@ -142,8 +145,9 @@ function PathView({ quick, before }: { quick: CrashQuick; before: CrashQuick | n
   const line = (p: CrashQuick["path"]) => p.north.map((n, i) => `${i ? "L" : "M"}${at(n, p.east[i]!)}`).join(" ");
   const body = (p: CrashQuick["path"], i: number) => outline(p, i).map(([n, e], k) => `${k ? "L" : "M"}${at(n, e)}`).join(" ") + " Z";
   const mesh = round(box.size / 4);
+  const [ahead, aside] = axesOf(quick.over_ground);
   return <figure class="path">
-    <svg viewBox={`0 0 ${box.size} ${box.size}`} role="img" aria-label={`Path of the vehicle, ${number(Math.hypot(path.north[last]! - path.north[0]!, path.east[last]! - path.east[0]!), 3)} m from its beginning to its end, plus or minus ${number(path.bound[last] ?? 0, 2)} m.`}>
+    <svg viewBox={`0 0 ${box.size} ${box.size}`} role="img" aria-label={`Path of the vehicle, ${number(Math.hypot(path.north[last]! - path.north[0]!, path.east[last]! - path.east[0]!), 3)} m from its beginning to its end, plus or minus ${number(path.bound[last] ?? 0, 2)} m. It ends ${number(path.north[last]!, 3)} m ${ahead} and ${number(path.east[last]!, 3)} m ${aside} of its position at the entry.`}>
       {Array.from({ length: Math.floor(box.size / mesh) }, (_, i) => <path key={i} class="mesh" vector-effect="non-scaling-stroke" d={`M${(i + 1) * mesh} 0 V${box.size} M0 ${(i + 1) * mesh} H${box.size}`} />)}
       <path class="outline start" vector-effect="non-scaling-stroke" d={body(path, 0)} />
       <path class="outline" vector-effect="non-scaling-stroke" d={body(path, last)} />
@@ -153,6 +157,6 @@ function PathView({ quick, before }: { quick: CrashQuick; before: CrashQuick | n
       <path class="track" vector-effect="non-scaling-stroke" d={line(path)} />
       <circle class="end" cx={path.east[last]! - box.west} cy={box.north - path.north[last]!} r={box.size / 90} />
     </svg>
-    <figcaption>Path, north up; squares of {number(mesh)} m; circles are 95 % bounds.{before ? " Dashed: as it was." : ""}</figcaption>
+    <figcaption>Path, {quick.over_ground ? "north up" : "up is forward of the vehicle at the entry, to the right its right"}; squares of {number(mesh)} m; circles are 95 % bounds.{before ? " Dashed: as it was." : ""}</figcaption>
   </figure>;
 }

@@ -4,7 +4,7 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { aborted, api, problemOf } from "./api";
 import { CrashPreview } from "./crash";
-import { number, plural } from "./format";
+import { number, plural, stamp } from "./format";
 import { putJob, setWork, useShared, type Point, type Work } from "./store";
 import type { Checked, Fault, Field, Problem, Question, Section } from "./types";
 import { Ask, Busy, Control, Copy, Empty, Findings, More, Page, Part, sentence, Trouble, useRequest } from "./ui";
@@ -19,20 +19,27 @@ export function ConfigurePage() {
   const kind = kinds.value?.find((one) => one.kind === work.kind);
   const [proposing, setProposing] = useState(false);
   const [problem, setProblem] = useState<Problem | null>(null);
+  const [choose, setChoose] = useState<Question[]>([]);
 
-  const propose = async () => {
+  const propose = async (log = work.log) => {
     if (!work.kind) return;
     setProposing(true);
     setProblem(null);
+    setChoose([]);
     try {
       const made = await api.propose({
-        kind: work.kind, files: work.files, log: { ...work.log, ...(work.axes ? { axes: work.axes } : {}) },
+        kind: work.kind, files: work.files, log: { ...log, ...(work.axes ? { axes: work.axes } : {}) },
         ...(work.trim ? { from_s: work.trim[0], to_s: work.trim[1] } : {}), answers: {},
       });
+      if (made.choose?.length) {
+        setChoose(made.choose);
+        setProposing(false);
+        return;
+      }
       let toml = made.toml;
       if (work.places) toml = await withPlaces(work.kind, toml, work.places);
       const { toml: _, ...proposal } = made;
-      setWork({ toml, proposal, proposedFor: basis(work), name: work.name || freeName(work, state?.runs.map((r) => r.name) ?? []) });
+      setWork({ toml, proposal, proposedFor: basis({ ...work, log }), name: work.name || freeName(work, state?.runs.map((r) => r.name) ?? []) });
     } catch (error) {
       setProblem(problemOf(error));
     }
@@ -45,15 +52,34 @@ export function ConfigurePage() {
   }
   return <Page title={kind?.title ?? "Set up"} lead="This was proposed from your log. Answer what is open, correct what is wrong, and run it.">
     {proposing && <Busy>Proposing a configuration from the log…</Busy>}
-    <Trouble problem={problem} retry={() => void propose()} />
+    <Trouble problem={problem} retry={() => void propose()} take={work.toml !== ""} />
     {problem && <p><a href="#/files">Choose other files</a>, <a href="#/look">look at how they are read</a>, or <a href="#/choose">find out something else</a>.</p>}
     <Trouble problem={kinds.problem} retry={kinds.again} />
+    <Basis work={work} />
+    {choose.length > 0 && <Part title={`${plural(choose.length, "question")} about the files`}>
+      {choose.map((q, i) => <Ask key={q.key} take={i === 0} question={{ ...q, text: q.file ? `${q.file}: ${q.text}` : q.text }} onAnswer={(set) => {
+        const log = { ...work.log, ...set };
+        setWork({ log });
+        void propose(log);
+      }} />)}
+    </Part>}
     {work.toml && work.proposedFor !== basis(work) && !proposing && <div class="notice warn" role="status">
       <p>How the log is read, or the part to use, was changed after this configuration was proposed.</p>
       <p class="row"><button type="button" onClick={() => void propose()}>Propose it anew</button> <span class="soft">What you wrote here is replaced.</span></p>
     </div>}
     {work.toml && !proposing && <Editor schema={kind?.schema ?? []} flags={kind?.options ?? []} />}
   </Page>;
+}
+
+/** What the configuration is made from: nothing that was chosen before is in it unseen. */
+function Basis({ work }: { work: Work }) {
+  const read = Object.entries({ ...work.log, ...(work.axes ? { axes: work.axes } : {}) });
+  return <dl class="facts basis">
+    <dt>Files</dt><dd>{work.files.join(", ")} <a href="#/files">Change</a></dd>
+    {work.trim && <><dt>Part to use</dt><dd>{stamp(work.trim[0], work.trim[1] - work.trim[0])} to {stamp(work.trim[1], work.trim[1] - work.trim[0])} s <a href="#/look">Change</a></dd></>}
+    {read.length > 0 && <><dt>Read with</dt><dd>{read.map(([key, value]) => `${key.replaceAll("_", " ")}: ${typeof value === "object" ? JSON.stringify(value) : value === "" ? "none" : String(value)}`).join("; ")} <a href="#/look">Change</a></dd></>}
+    {work.places && <><dt>Places</dt><dd>of the sensor{work.places.antenna.some((v) => v !== 0) ? " and the antenna" : ""}, as drawn <a href="#/look">Change</a></dd></>}
+  </dl>;
 }
 
 async function withPlaces(kind: string, toml: string, places: NonNullable<Work["places"]>): Promise<string> {
@@ -89,6 +115,8 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
   const [checked, setChecked] = useState<Checked | null>(null);
   const [checking, setChecking] = useState(true);
   const [problem, setProblem] = useState<Problem | null>(null);
+  // What the run button answers, beside it.
+  const [refused, setRefused] = useState<Problem | null>(null);
   const [starting, setStarting] = useState(false);
   const [force, setForce] = useState("");
   const serial = useRef(0);
@@ -117,14 +145,16 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
   const set = (change: Record<string, unknown>) => void check(work.toml, change);
 
   const run = async () => {
+    setRefused(null);
+    if (reason) return setRefused({ code: "studio.not-ready", text: `It cannot run yet: ${reason}`, remedy: first ? null : "Write it above." });
+    if (checking) return setRefused({ code: "studio.not-ready", text: "It cannot run yet: the configuration is being checked", remedy: "Press again in a moment." });
     setStarting(true);
-    setProblem(null);
     try {
       const job = await api.begin({ kind, name: work.name, toml: work.toml, options: [...work.options, ...(taken && force === work.name ? ["--force"] : [])] });
       putJob(job);
       location.hash = `#/job/${encodeURIComponent(job.id)}`;
     } catch (error) {
-      setProblem(problemOf(error));
+      setRefused(problemOf(error));
     }
     setStarting(false);
   };
@@ -135,7 +165,11 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
   const questions = openQuestions(checked, proposal?.questions ?? []);
   const assumed = (proposal?.to_check ?? []).filter((q) => q.key && q.key in values);
   const taken = state?.runs.some((one) => one.name === work.name) ?? false;
-  const reason = errors.length ? `${plural(errors.length, "error")} to correct first` : questions.length ? `${plural(questions.length, "question")} to answer first` : !work.name.trim() ? "The result needs a name" : "";
+  const reason = errors.length ? `${plural(errors.length, "error")} to correct first` : questions.length ? `${plural(questions.length, "question")} to answer first`
+    : !work.name.trim() ? "the result needs a name" : taken && force !== work.name ? `there is a result named ${work.name}: tick to overwrite it, or write another name` : "";
+  /** Where the first thing is that is to be done: its control, for the focus. */
+  const first = errors.length ? ".toml .findings button, .toml textarea" : questions.length ? ".ask button, .ask input" : "";
+  useEffect(() => setRefused(null), [work.toml, work.name, force, questions.length, errors.length]);
   return <>
     <Questions questions={questions} values={values} onAnswer={set} />
     {assumed.length > 0 && <Part title="Assumed: correct it if it is wrong">
@@ -171,9 +205,11 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
     <div class="next startrun">
       <label class="inline">Name of the result <input type="text" value={work.name} onInput={(e) => setWork({ name: e.currentTarget.value })} aria-describedby="taken" /></label>
       {taken && <label class="inline" id="taken"><input type="checkbox" checked={force === work.name} onChange={(e) => setForce(e.currentTarget.checked ? work.name : "")} /> Overwrite the result of this name</label>}
-      <button type="button" class="main" disabled={starting || reason !== "" || (taken && force !== work.name)} aria-describedby="reason" onClick={() => void run()}>Run it</button>
-      <span id="reason" class="soft">{reason}</span>
+      <button type="button" class={reason ? "main notready" : "main"} disabled={starting} aria-describedby="reason" onClick={() => void run()}>Run it</button>
+      <span id="reason" class="soft">{starting ? "Starting…" : reason}</span>
     </div>
+    <Trouble problem={refused} take />
+    {refused && first && <p class="row"><button type="button" onClick={() => { const to = document.querySelector<HTMLElement>(first); to?.scrollIntoView({ block: "center" }); to?.focus(); }}>Go to the first</button></p>}
   </>;
 }
 

@@ -1,11 +1,12 @@
 // Start: bring files, see what is in the folder, go on with an earlier result.
 
+import { Fragment } from "preact";
 import { useRef, useState } from "preact/hooks";
 import { api, problemOf, ServerError } from "./api";
 import { bytes, date, plural } from "./format";
 import { newWork, refresh, useShared } from "./store";
 import type { Problem, Sample } from "./types";
-import { Empty, Page, Part, Trouble } from "./ui";
+import { Empty, More, Page, Part, Trouble } from "./ui";
 
 interface Sending { name: string; share: number; problem: Problem | null; taken: boolean; file: File }
 
@@ -16,23 +17,31 @@ export function FilesPage() {
   const [over, setOver] = useState(false);
   const [problem, setProblem] = useState<Problem | null>(null);
   const input = useRef<HTMLInputElement>(null);
+  // Under the same name there is something else now.
+  const replaced = useRef(false);
   const files = state?.files ?? [];
-  const here = chosen.filter((name) => files.some((file) => file.name === name));
+  const here = chosen.filter((name) => files.some((file) => file.name === name || file.inside?.includes(name)));
 
   const put = (name: string, part: Partial<Sending>) =>
     setSending((all) => all.map((one) => one.name === name ? { ...one, ...part } : one));
+  const choose = (name: string) => setChosen((names) => names.includes(name) ? names : [...names, name]);
   const upload = async (file: File, replace: boolean) => {
     put(file.name, { problem: null, taken: false, share: 0 });
     try {
-      await api.upload(file, replace, (share) => put(file.name, { share }));
+      // The server says under which name it is kept.
+      const { name } = await api.upload(file, replace, (share) => put(file.name, { share }));
       setSending((all) => all.filter((one) => one.name !== file.name));
-      setChosen((names) => names.includes(file.name) ? names : [...names, file.name]);
+      choose(name);
+      replaced.current ||= replace;
     } catch (error) {
       put(file.name, { problem: problemOf(error), taken: error instanceof ServerError && error.status === 409 });
     }
   };
   const bring = async (list: FileList | null) => {
     const brought = [...(list ?? [])];
+    if (!brought.length) return;
+    // What is brought is what is meant: what was chosen for something else is not.
+    setChosen([]);
     setSending((all) => [...all.filter((one) => !brought.some((file) => file.name === one.name)),
       ...brought.map((file) => ({ name: file.name, share: 0, problem: null, taken: false, file }))]);
     // One after the other: the disk is the bottleneck, and each progress means something.
@@ -49,9 +58,10 @@ export function FilesPage() {
       setProblem(problemOf(error));
     }
   };
+  const leave = (one: Sending) => setSending((all) => all.filter((s) => s.name !== one.name));
   const toggle = (name: string) => setChosen(here.includes(name) ? here.filter((n) => n !== name) : [...here, name]);
   const go = () => {
-    if (here.join("\n") !== work.files.join("\n")) newWork(here);
+    if (replaced.current || here.join("\n") !== work.files.join("\n")) newWork(here);
     location.hash = "#/look";
   };
 
@@ -71,7 +81,8 @@ export function FilesPage() {
         {one.problem && <div class="notice bad" role="alert"><p>{one.problem.text}</p>
           <div class="row">
             {one.taken ? <button type="button" onClick={() => void upload(one.file, true).then(refresh)}>Replace it</button> : one.problem.remedy && <p>{one.problem.remedy}</p>}
-            <button type="button" onClick={() => setSending((all) => all.filter((s) => s !== one))}>Leave it</button>
+            {one.taken && files.some((file) => file.name === one.name) && <button type="button" onClick={() => { leave(one); choose(one.name); }}>Use the one that is there</button>}
+            <button type="button" onClick={() => leave(one)}>Leave it</button>
           </div></div>}
       </li>)}
     </ul>}
@@ -83,11 +94,17 @@ export function FilesPage() {
     <Part title="Files in the folder">
       {files.length === 0 ? <Empty>There is no file yet.</Empty> : <>
         <fieldset class="list"><legend>Choose those of one recording</legend>
-          {files.map((file) => <label key={file.name} class="item">
-            <input type="checkbox" checked={here.includes(file.name)} onChange={() => toggle(file.name)} />
-            <span class="name">{file.name}</span><span class="soft">{file.folder ? "folder, " : ""}{bytes(file.bytes)}</span><span class="soft when">{date(file.modified)}</span>
-          </label>)}
+          {files.map((file) => <Fragment key={file.name}>
+            <label class="item">
+              <input type="checkbox" checked={here.includes(file.name)} onChange={() => toggle(file.name)} />
+              <span class="name">{file.name}</span><span class="soft">{file.folder ? "folder, " : ""}{bytes(file.bytes)}</span><span class="soft when">{date(file.modified)}</span>
+            </label>
+            {file.inside && file.inside.length > 0 && <More title={<>{plural(file.inside.length, "file")} in {file.name} <span class="soft">where one of them is the log, and not the folder</span></>} open={file.inside.some((name) => here.includes(name))}>
+              {file.inside.map((name) => <label class="item" key={name}><input type="checkbox" checked={here.includes(name)} onChange={() => toggle(name)} /><span class="name">{name}</span></label>)}
+            </More>}
+          </Fragment>)}
         </fieldset>
+        {here.length > 0 && <p class="soft" role="status">Chosen: {here.join(", ")}. {here.length > 1 && <button type="button" onClick={() => setChosen([])}>Choose none</button>}</p>}
         <div class="next"><button type="button" class="main" disabled={!here.length} onClick={go}>Look into {here.length ? plural(here.length, "file") : "them"}</button></div>
       </>}
     </Part>

@@ -1,6 +1,6 @@
 // Look: what is in the log, the evidence, the questions, the traces; then choose what to find out.
 
-import { useMemo, useState } from "preact/hooks";
+import { useEffect, useId, useMemo, useState } from "preact/hooks";
 import { api, type Reading } from "./api";
 import { duration, number, plural, stamp } from "./format";
 import { Plan, type Line } from "./plan";
@@ -51,8 +51,16 @@ export function LookPage() {
 }
 
 function inOneSentence(look: Look): string {
+  const records = recordsOf(look);
+  const channels = look.streams.filter(ofCrash);
+  if (records.length) {
+    const [from, to] = spanOf(channels);
+    const count = channels.reduce((sum, s) => sum + s.columns.length, 0);
+    if (!channels.some(certain)) return `${plural(count, "channel")} of a table that is no log. If it is of a crash, say “Crash” on the next page.`;
+    return count ? `${records.length > 1 ? "Records" : "A record"} of a crash: ${plural(count, "channel")} over ${duration(to - from)}.` : "A record of a crash, none of whose channels can be drawn.";
+  }
   const imu = look.streams.find((s) => s.name === "imu") ?? look.streams[0];
-  if (!imu) return recordsOf(look).length ? "A record of a crash." : "No stream of samples was found in these files.";
+  if (!imu) return "No stream of samples was found in these files.";
   const others = look.streams.filter((s) => s !== imu).map((s) => WORDS[s.name] ?? s.name);
   return `${duration(imu.to_s - imu.from_s)} of inertial samples${rateOf(look, imu) ? ` at ${number(rateOf(look, imu)!, 3)} Hz` : ""}${others.length ? `, with ${[...new Set(others)].join(", ")}` : ""}.`;
 }
@@ -60,18 +68,28 @@ function inOneSentence(look: Look): string {
 /** Files that are no logs of inertial samples, and can be read as records of a crash. */
 const recordsOf = (look: Look) => look.logs.filter((log) => !log.read_as.length && (log.fit["crash"]?.answer ?? "no") !== "no");
 
+/** A stream of the channels of a crash. */
+const ofCrash = (s: Stream) => s.columns.some((c) => c.title !== undefined);
+
+/** One with an acceleration, a rate or a velocity, and not of quantities that are unknown. */
+const certain = (s: Stream) => s.columns.some((c) => c.title !== undefined && c.title !== "As recorded");
+
+const spanOf = (streams: Stream[]): Span => streams.length ? [Math.min(...streams.map((s) => s.from_s)), Math.max(...streams.map((s) => s.to_s))] : [0, 0];
+
 const rateOf = (look: Look, s: Stream) => s.rate_hz ?? look.logs.find((log) => log.name === s.file)?.streams.find((one) => one.name === s.name)?.rate_hz ?? null;
 
 const WORDS: Record<string, string> = {
   imu: "inertial sensors", gnss: "satellite fixes", magnetometer: "magnetometer", barometer: "barometer",
-  wheel: "wheel speeds", reference: "a reference", pressure: "air pressure",
+  wheel: "wheel speeds", reference: "a reference", pressure: "air pressure", crash: "channels of a crash",
 };
+
+const wordsOf = (s: Stream) => WORDS[s.name] ?? (ofCrash(s) ? s.name.replace(/^crash-/, "channels of a crash, ") : s.name);
 
 function Found({ look, reading }: { look: Look; reading: Reading }) {
   const { work } = useShared();
   const records = recordsOf(look);
-  const logs = look.logs.filter((log) => !records.includes(log));
-  const faults = [...logs.flatMap((log) => log.faults.map((f) => ({ ...f, file: f.file ?? log.name }))), ...(look.between ?? [])];
+  // That a record is no log of inertial samples is no fault of it; what is wrong with a channel is.
+  const faults = [...look.logs.flatMap((log) => log.faults.filter((f) => !records.includes(log) || f.severity !== "error").map((f) => ({ ...f, file: f.file ?? log.name }))), ...(look.between ?? [])];
   const notes = look.logs.flatMap((log) => log.notes.map((f) => ({ ...f, file: f.file ?? log.name })));
   const streams = look.streams.filter((s) => s.rows > 1 && s.columns.length > 0);
   const imu = streams.find((s) => s.name === "imu") ?? streams[0];
@@ -84,7 +102,7 @@ function Found({ look, reading }: { look: Look; reading: Reading }) {
     </Part>}
     {optional.length > 0 && <Part title="Is this right?">{optional.map(ask)}</Part>}
     <Part title="What is in it">
-      {records.length > 0 && <p>{records.map((log) => log.name).join(", ")}: {records.length > 1 ? "records" : "a record"} of a crash. Choose “Crash” on the next page: its channels are read there.</p>}
+      {records.length > 0 && look.streams.some(certain) && <p>{records.map((log) => log.name).join(", ")}: {records.length > 1 ? "records" : "a record"} of a crash. Choose “Crash” on the next page.</p>}
       <Contents look={look} />
     </Part>
     {imu && <Signals look={look} streams={streams} imu={imu} reading={reading} />}
@@ -108,7 +126,7 @@ function Contents({ look }: { look: Look }) {
     <Table head={["Stream", "File", "Samples", "Rate", "From", "To", "Gaps"]} numeric={[2, 3, 4, 5, 6]}
       rows={look.streams.map((s) => {
         const told = look.logs.find((log) => log.name === s.file)?.streams.find((one) => one.name === s.name);
-        return [WORDS[s.name] ?? s.name, s.file ?? "", s.rows.toLocaleString("en"), rateOf(look, s) ? `${number(rateOf(look, s)!, 4)} Hz` : "–",
+        return [wordsOf(s), s.file ?? "", s.rows.toLocaleString("en"), rateOf(look, s) ? `${number(rateOf(look, s)!, 4)} Hz` : "–",
           `${stamp(s.from_s, 1)} s`, `${stamp(s.to_s, 1)} s`, told?.gaps ? `${told.gaps}, ${duration(told.lost_s)} lost` : "none"];
       })} />
     <dl class="facts">
@@ -132,28 +150,50 @@ const QUANTITIES: [RegExp, string][] = [
   [/^(alt|height)/, "Height"], [/^(VN|VE|VD)$/, "Velocity"], [/^q_/, "Quaternion"], [/^(roll|pitch|heading)$/, "Attitude"],
 ];
 
+/** Curves in one panel, at most: as many as there are colors. */
+const TOGETHER = 4;
+
 /** Columns of one quantity share a panel, as far as their units are one. */
 export function panelsOf(stream: Stream): Panel[] {
   const panels = new Map<string, Panel>();
-  for (const { name, unit } of stream.columns) {
-    const title = QUANTITIES.find(([pattern]) => pattern.test(name))?.[1] ?? name;
+  for (const { name, unit, title: own, label } of stream.columns) {
+    const title = own ?? QUANTITIES.find(([pattern]) => pattern.test(name))?.[1] ?? name;
     if (title === "") continue;
-    const key = `${title}|${unit ?? ""}`;
-    const panel = panels.get(key) ?? { title, unit: unit ?? "", columns: [] };
-    panel.columns.push({ name, label: name.replace(/^(gyro|accel|mag)_/, "") });
+    let key = `${title}|${unit ?? ""}`, shown = title;
+    for (let i = 2; (panels.get(key)?.columns.length ?? 0) >= TOGETHER; i++) { key = `${title}|${unit ?? ""}|${i}`; shown = `${title} (${i})`; }
+    const panel = panels.get(key) ?? { title: shown, unit: unit ?? "", columns: [] };
+    panel.columns.push({ name, label: label ?? name.replace(/^(gyro|accel|mag)_/, "") });
     panels.set(key, panel);
   }
   return [...panels.values()];
 }
 
+const keyOf = (s: Stream) => `${s.file ?? ""}|${s.name}`;
+
+/** The entry of the list of streams that shows the channels of all records under one cursor. */
+const ALL = "all";
+/** Panels that are shown at first, where there are many. */
+const SHOWN = 6;
+
+/** Streams that belong together in time: those that overlap the first record. */
+function together(streams: Stream[]): Stream[] {
+  const first = streams.find(ofCrash);
+  return first ? streams.filter((s) => (ofCrash(s) || s.name === "imu") && s.from_s < first.to_s && s.to_s > first.from_s) : [];
+}
+
 function Signals({ look, streams, imu, reading }: { look: Look; streams: Stream[]; imu: Stream; reading: Reading }) {
   const { work } = useShared();
-  const [name, setName] = useState(`${imu.file ?? ""}|${imu.name}`);
+  const crash = useMemo(() => together(streams), [streams]);
+  const [name, setName] = useState(crash.length ? ALL : keyOf(imu));
   const [cursor, setCursor] = useState<number | null>(null);
   const [label, setLabel] = useState("");
-  const stream = streams.find((s) => `${s.file ?? ""}|${s.name}` === name) ?? imu;
-  const whole = useMemo<Span>(() => [stream.from_s, stream.to_s], [stream.from_s, stream.to_s]);
-  const panels = useMemo(() => panelsOf(stream), [stream]);
+  const [picked, setPicked] = useState<string[] | null>(null);
+  const shown = useMemo(() => name === ALL && crash.length ? crash : [streams.find((s) => keyOf(s) === name) ?? imu], [name, streams]);
+  const whole = useMemo<Span>(() => spanOf(shown), [shown]);
+  const several = new Set(shown.map((s) => s.file)).size > 1;
+  const all = useMemo(() => shown.flatMap((s) => panelsOf(s).map((p) => ({ ...p, source: keyOf(s), title: several && s.file ? `${p.title} (${s.file})` : p.title }))), [shown]);
+  const chosen = picked ?? all.slice(0, SHOWN).map((p) => p.title);
+  const panels = useMemo(() => all.length > SHOWN ? all.filter((p) => chosen.includes(p.title)) : all, [all, chosen.join("|")]);
   const trim: Span = work.trim ?? [imu.from_s, imu.to_s];
   const setTrim = (t: Span) => setWork({ trim: t[0] <= imu.from_s && t[1] >= imu.to_s ? null : t });
   const addMark = (t: number, words?: string) => {
@@ -161,22 +201,24 @@ function Signals({ look, streams, imu, reading }: { look: Look; streams: Stream[
     setLabel("");
   };
   const plan = useFixes(streams, reading);
-  const file = stream.file ?? reading.files[0]!;
-  return <Part title="The traces" aside={streams.length > 1 ? <label class="inline">Show <select value={`${stream.file ?? ""}|${stream.name}`} onChange={(e) => setName(e.currentTarget.value)}>
-    {streams.map((s) => <option key={`${s.file ?? ""}|${s.name}`} value={`${s.file ?? ""}|${s.name}`}>{WORDS[s.name] ?? s.name}{look.logs.length > 1 && s.file ? ` (${s.file})` : ""}</option>)}
+  // A case takes its records whole: a part to use would be no part of it.
+  const trims = recordsOf(look).length === 0;
+  const ask = (columns: string[], view: Span, width: number, signal: AbortSignal, source: string) => {
+    const of = shown.find((s) => keyOf(s) === source) ?? shown[0]!;
+    return api.series(reading, of.file ?? reading.files[0]!, of.name, { columns, from: view[0], to: view[1], width }, signal);
+  };
+  return <Part title="The traces" aside={streams.length > 1 ? <label class="inline">Show <select value={name} onChange={(e) => { setName(e.currentTarget.value); setPicked(null); }}>
+    {crash.length > 0 && <option value={ALL}>all channels of the crash</option>}
+    {streams.map((s) => <option key={keyOf(s)} value={keyOf(s)}>{wordsOf(s)}{look.logs.length > 1 && s.file ? ` (${s.file})` : ""}</option>)}
   </select></label> : undefined}>
-    <Traces panels={panels} whole={whole} askKey={JSON.stringify([reading, name])} cursor={cursor} onCursor={setCursor}
-      ask={(columns, view, width, signal) => api.series(reading, file, stream.name, { columns, from: view[0], to: view[1], width }, signal)}
-      trim={work.trim} marks={work.marks} rests={look.rests} gaps={look.gaps} onTrim={setTrim} onMark={(t) => addMark(t)} />
-    <p class="legend"><span><i class="area rest" />at rest</span><span><i class="area gap" />gap</span><span><i class="area away" />not used</span></p>
-    <h3>The part to use</h3>
-    <TrimBar whole={[imu.from_s, imu.to_s]} trim={trim} onTrim={setTrim} rests={look.rests} gaps={look.gaps} marks={work.marks} />
-    <div class="row">
-      <TrimInput label="From" value={trim[0]} length={imu.to_s - imu.from_s} onChange={(v) => { if (v < trim[1]) setTrim([Math.max(v, imu.from_s), trim[1]]); }} />
-      <TrimInput label="To" value={trim[1]} length={imu.to_s - imu.from_s} onChange={(v) => { if (v > trim[0]) setTrim([trim[0], Math.min(v, imu.to_s)]); }} />
-      <span class="soft">{duration(trim[1] - trim[0])} of {duration(imu.to_s - imu.from_s)}</span>
-      <button type="button" disabled={!work.trim} onClick={() => setWork({ trim: null })}>Use all</button>
-    </div>
+    {all.length > SHOWN && <More title={`${panels.length} of ${plural(all.length, "group")} of channels are shown: choose`}><fieldset class="row pick"><legend>Show</legend>
+      {all.map((p) => <label class="inline" key={p.title}><input type="checkbox" checked={chosen.includes(p.title)} onChange={(e) => setPicked(e.currentTarget.checked ? [...chosen, p.title] : chosen.filter((t) => t !== p.title))} />{p.title}</label>)}
+    </fieldset></More>}
+    {shown.some(ofCrash) && <p class="soft">As the files state them: in SI where the unit is known, at the time of each file, not yet turned into the axes of the vehicle.</p>}
+    <Traces panels={panels} whole={whole} askKey={JSON.stringify([reading, name])} cursor={cursor} onCursor={setCursor} ask={ask}
+      trim={trims ? work.trim : null} marks={work.marks} rests={look.rests} gaps={look.gaps} {...(trims ? { onTrim: setTrim } : {})} onMark={(t) => addMark(t)} />
+    <p class="legend"><span><i class="area rest" />at rest</span><span><i class="area gap" />gap</span>{trims && <span><i class="area away" />not used</span>}</p>
+    {trims && <Trim whole={[imu.from_s, imu.to_s]} trim={trim} onTrim={setTrim} look={look} />}
     <h3>Reference points</h3>
     <p class="help">Instants to find again: the impact, a stop, a turn. Put the cursor there first.</p>
     <form class="row" onSubmit={(e) => { e.preventDefault(); if (cursor !== null) addMark(cursor, label.trim()); }}>
@@ -186,17 +228,60 @@ function Signals({ look, streams, imu, reading }: { look: Look; streams: Stream[
     {work.marks.length > 0 && <ul class="list">{work.marks.map((mark) => <li class="item" key={mark.t}>
       <span class="name">{mark.label}</span><span>{stamp(mark.t, 1)} s</span>
       <span class="row"><button type="button" onClick={() => setCursor(mark.t)}>Show</button>
-        <button type="button" disabled={mark.t >= trim[1]} onClick={() => setTrim([mark.t, trim[1]])}>Begin here</button>
-        <button type="button" disabled={mark.t <= trim[0]} onClick={() => setTrim([trim[0], mark.t])}>End here</button>
+        {trims && <button type="button" disabled={mark.t >= trim[1]} onClick={() => setTrim([mark.t, trim[1]])}>Begin here</button>}
+        {trims && <button type="button" disabled={mark.t <= trim[0]} onClick={() => setTrim([trim[0], mark.t])}>End here</button>}
         <button type="button" aria-label={`Remove the mark ${mark.label}`} onClick={() => setWork({ marks: work.marks.filter((m) => m !== mark) })}>Remove</button></span>
     </li>)}</ul>}
     {plan && <><h3>From above</h3><Plan track={null} fixes={plan} cursor={cursor} onCursor={setCursor} /></>}
   </Part>;
 }
 
-function TrimInput({ label, value, length, onChange }: { label: string; value: number; length: number; onChange: (value: number) => void }) {
-  return <label class="inline">{label} <span class="withunit"><input type="text" inputMode="decimal" size={12} value={stamp(value, Math.min(length, 10))}
-    onChange={(e) => { const v = Number(e.currentTarget.value); if (Number.isFinite(v)) onChange(v); }} /><span class="unit">s</span></span></label>;
+/** What becomes of a beginning or an end that was written, and what is said of it. */
+export function trimmed(which: 0 | 1, text: string, trim: Span, whole: Span): { trim: Span | null; said: string } {
+  const t = Number(text.trim().replace(",", "."));
+  const length = Math.min(whole[1] - whole[0], 10), told = (v: number) => `${stamp(v, length)} s`;
+  if (text.trim() === "" || !Number.isFinite(t)) return { trim: null, said: `“${text}” is no number of seconds. Write one such as ${stamp(trim[which], length)}.` };
+  const other = trim[1 - which]!;
+  if (which === 0 ? t >= other : t <= other) {
+    return { trim: null, said: which === 0 ? `The part cannot begin at ${told(t)}: it ends at ${told(other)}. Move its end first, or write an earlier time.` : `The part cannot end at ${told(t)}: it begins at ${told(other)}. Move its beginning first, or write a later time.` };
+  }
+  const kept = Math.min(whole[1], Math.max(whole[0], t));
+  return { trim: which === 0 ? [kept, other] : [other, kept], said: kept === t ? "" : which === 0 ? `The log begins at ${told(kept)}: the part begins there.` : `The log ends at ${told(kept)}: the part ends there.` };
+}
+
+function Trim({ whole, trim, onTrim, look }: { whole: Span; trim: Span; onTrim: (trim: Span) => void; look: Look }) {
+  const { work } = useShared();
+  return <>
+    <h3>The part to use</h3>
+    <TrimBar whole={whole} trim={trim} onTrim={onTrim} rests={look.rests} gaps={look.gaps} marks={work.marks} />
+    <div class="row">
+      <TrimInput label="From" which={0} trim={trim} whole={whole} onTrim={onTrim} />
+      <TrimInput label="To" which={1} trim={trim} whole={whole} onTrim={onTrim} />
+      <span class="soft">{duration(trim[1] - trim[0])} of {duration(whole[1] - whole[0])}</span>
+      <button type="button" disabled={!work.trim} onClick={() => setWork({ trim: null })}>Use all</button>
+    </div>
+  </>;
+}
+
+function TrimInput({ label, which, trim, whole, onTrim }: { label: string; which: 0 | 1; trim: Span; whole: Span; onTrim: (trim: Span) => void }) {
+  const written = stamp(trim[which], Math.min(whole[1] - whole[0], 10));
+  const [text, setText] = useState<string | null>(null);
+  const [said, setSaid] = useState({ text: "", wrong: false });
+  const id = useId();
+  // A part that was set by other means leaves nothing to say.
+  useEffect(() => { setText(null); setSaid((one) => one.wrong ? { text: "", wrong: false } : one); }, [trim[0], trim[1]]);
+  const commit = () => {
+    if (text === null || text === written) { setText(null); return setSaid({ text: "", wrong: false }); }
+    const made = trimmed(which, text, trim, whole);
+    setSaid({ text: made.said, wrong: made.trim === null });
+    // What is refused stays to be corrected.
+    if (made.trim) { setText(null); onTrim(made.trim); }
+  };
+  return <span class="triminput">
+    <label class="inline">{label} <span class="withunit"><input type="text" inputMode="decimal" size={12} value={text ?? written} aria-invalid={said.wrong} aria-describedby={said.text ? id : undefined}
+      onInput={(e) => setText(e.currentTarget.value)} onBlur={commit} onKeyDown={(e) => { if (e.key === "Enter") commit(); }} /><span class="unit">s</span></span></label>
+    <span id={id} class={said.wrong ? "fault" : "soft"} role="alert">{said.text}</span>
+  </span>;
 }
 
 /** The fixes of the log, as a line for the plan. */
@@ -257,7 +342,7 @@ export function suffices(kind: Kind, look: Look): { answer: string; reasons: Fin
   const longest = look.rests.length ? Math.max(...look.rests.map(([a, b]) => b - a)) : 0;
   const say = (answer: string, text: string) => ({ answer, reasons: [{ code: "studio.rests", severity: "note", text }] });
   const rest = longest ? `the longest rest is ${duration(longest)}` : "no rest was found";
-  if (kind.kind === "align") return say(longest >= 60 ? "yes" : longest > 0 ? "with limits" : "no", rest);
+  if (kind.kind === "align") return say(longest > 0 ? "with limits" : "no", `${rest}; roll and pitch by any accelerometer, a heading only by gyros that feel the rotation of the Earth, not by those of a phone: state it for these`);
   if (kind.kind === "allan") return say(longest >= 3600 ? "yes" : longest >= 300 ? "with limits" : "no", `${rest}; an hour is better than a minute`);
   return null;
 }

@@ -57,7 +57,7 @@ const VERDICTS: Record<string, { words: string; look: string }> = {
 
 /** What people ask for first, by the names of `strapdown compare`. */
 const MAIN = [
-  /: delta-V$/, /: direction of force/, /: clock direction$/, /^At the end: position, horizontal$/, /^At the end: heading$/, /: way over ground$/, /: largest 95 % bound, horizontal$/, /^At the end: height$/,
+  /: delta-V$/, /: direction of force/, /: clock direction$/, /^At the end: position, horizontal$/, /^At the end: heading$/, /^Errors against the truth: .*horizontal, rms$/, /^Errors against truth: quaternion, rms$/, /: way over ground$/, /: largest 95 % bound, horizontal$/, /^At the end: height$/,
   /^At the end: roll$/, /^At the end: pitch$/, /: algorithm$/, /: lowest rate$/, /: shortest time/,
 ];
 
@@ -86,7 +86,7 @@ function Numbers({ numbers }: { numbers: KeyNumber[] }) {
   const large = main.length ? main : all.filter((one) => one.value !== null && bound(one)).slice(0, 4);
   return <>
     {large.length > 0 && <dl class="keys">
-      {large.map((one) => <div key={`${one.group} ${one.label}`}><dt>{[one.label.replace(/^./, (c) => c.toUpperCase()), one.group?.toLowerCase() === "at the end" ? "at the end" : ""].filter(Boolean).join(" ")}</dt>
+      {large.map((one) => <div key={`${one.group} ${one.label}`}><dt>{[one.label.replace(/^./, (c) => c.toUpperCase()), one.group?.toLowerCase() === "at the end" ? "at the end" : "", one.group?.startsWith("Errors against") ? "against the reference" : ""].filter(Boolean).join(" ")}</dt>
         <dd>{one.value === null ? `${bound(one)} ${one.unit}` : valueOf(one)} {one.value !== null && <small>{bound(one)} {one.unit}</small>}</dd></div>)}
     </dl>}
     {large.some(bound) && <p class="help">Bounds hold 95 % of the time.</p>}
@@ -108,8 +108,12 @@ const GROUPS: [RegExp, string, string?][] = [
 const BY_ALGORITHM = /^(\S.*) (roll|pitch|heading|q_[wxyz])(_deg)?$/;
 const QUANTITY: Record<string, string> = { roll: "Roll by algorithm", pitch: "Pitch by algorithm", heading: "Heading by algorithm" };
 
+/** Words of axes along the vehicle at its entry, where no heading is known. */
+const ALONG: [RegExp, string][] = [[/^(north|VN)\b/, "forward"], [/^(east|VE)\b/, "right"], [/^VD\b/, "down"]];
+
 /** Panels for the columns of a result: of one quantity in one panel. */
-export function panelsOfRun(series: SeriesData): Panel[] {
+export function panelsOfRun(series: SeriesData, overGround = true): Panel[] {
+  const told = (label: string) => overGround ? label : ALONG.reduce((words, [pattern, own]) => words.replace(pattern, own), label);
   const panels = new Map<string, Panel>();
   for (const title of [...GROUPS.map(([, title]) => title), ...Object.values(QUANTITY)]) if (title) panels.set(title, { title, unit: "", columns: [] });
   for (const [name, { unit }] of Object.entries(series.columns)) {
@@ -118,9 +122,10 @@ export function panelsOfRun(series: SeriesData): Panel[] {
     if (!title) continue;
     const panel = panels.get(title) ?? { title, unit: unit ?? "", columns: [] };
     panel.unit = unit ?? "";
-    panel.columns.push({ name, label: label ?? name.replace(/_sd.*$/, "") });
+    panel.columns.push({ name, label: told(label ?? name.replace(/_sd.*$/, "")) });
     panels.set(title, panel);
   }
+  if (!overGround) for (const title of ["Path", "Velocity", "Heading"]) panels.get(title)!.title += title === "Heading" ? ", from that at the entry" : ", along the vehicle at the entry";
   return [...panels.values()].filter((panel) => panel.columns.length);
 }
 
@@ -175,8 +180,8 @@ function Motion({ run, track, cursor, onCursor }: { run: RunDetail; track: Track
       <output>{stamp(at, 10)} s</output>
     </div>
     <div class="motion">
-      {hasPlace && <Plan track={track} onMap={Boolean(run.has.track)} fixes={track.fixes} reference={track.reference} cursor={at} onCursor={onCursor} />}
-      {track.q && <Attitude q={q} at={`${track.by ? `By ${track.by}, ` : ""}${stamp(at, 10)} s:`} />}
+      {hasPlace && <Plan track={track} onMap={Boolean(run.has.track)} {...(run.over_ground === false ? { up: "forward at the entry" } : {})} fixes={track.fixes} reference={track.reference} cursor={at} onCursor={onCursor} />}
+      {track.q && <Attitude q={q} turned={run.over_ground === false} at={`${track.by ? `By ${track.by}, ` : ""}${stamp(at, 10)} s:`} />}
     </div>
     <Series run={run} whole={whole} cursor={cursor} onCursor={onCursor} />
   </Part>;
@@ -185,7 +190,7 @@ function Motion({ run, track, cursor, onCursor }: { run: RunDetail; track: Track
 function Series({ run, whole, cursor, onCursor }: { run: RunDetail; whole: Span; cursor: number | null; onCursor: (t: number | null) => void }) {
   // One bucket: which columns there are.
   const columns = useRequest(run.panels || !run.has.series ? null : (signal) => api.runSeries(run.name, { columns: [], width: 1 }, signal), [run.name]);
-  const all = useMemo(() => run.panels ?? (columns.value ? panelsOfRun(columns.value) : []), [run, columns.value]);
+  const all = useMemo(() => run.panels ?? (columns.value ? panelsOfRun(columns.value, run.over_ground !== false) : []), [run, columns.value]);
   const [picked, setPicked] = useState<string[] | null>(null);
   const chosen = picked ?? all.slice(0, 3).map((p) => p.title);
   const panels = useMemo(() => all.filter((p) => chosen.includes(p.title)), [all, chosen.join("|")]);

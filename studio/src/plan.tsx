@@ -13,6 +13,8 @@ export interface PlanProps {
   cursor: number | null; onCursor: (t: number | null) => void;
   /** False where the positions are of no place on the Earth. */
   onMap?: boolean;
+  /** What is up, where it is not north. */
+  up?: string;
 }
 
 /** What `map.js`, loaded only where a map is shown, offers. */
@@ -141,7 +143,7 @@ function GridPlan(props: PlanProps) {
     ctx.scale(dense, dense);
     const x = (east: number) => width / 2 + (east - view.east) * view.scale;
     const y = (north: number) => HEIGHT / 2 - (north - view.north) * view.scale;
-    drawGrid(ctx, width, view);
+    drawGrid(ctx, width, view, props.up ?? "N");
     const path = (line: Flat | null, stroke: string, thick: number) => {
       if (!line) return;
       ctx.strokeStyle = stroke;
@@ -185,7 +187,7 @@ function GridPlan(props: PlanProps) {
         ctx.stroke();
       }
     }
-  }, [flat, view, width, props.cursor, dark]);
+  }, [flat, view, width, props.cursor, props.up, dark]);
 
   const zoom = (factor: number) => view && setMoved({ ...view, scale: view.scale * factor });
   const shift = (right: number, up: number) => view && setMoved({ ...view, east: view.east + (right * 60) / view.scale, north: view.north + (up * 60) / view.scale });
@@ -217,7 +219,7 @@ function GridPlan(props: PlanProps) {
     act[event.key]!();
   };
   return <div ref={element} class="grid">
-    <canvas ref={canvas} tabIndex={0} role="img" aria-label="Plan of the track, north up, on a grid of meters. Arrow keys move it, plus and minus zoom, 0 shows all."
+    <canvas ref={canvas} tabIndex={0} role="img" aria-label={`Plan of the track, ${props.up ? `up is ${props.up}` : "north up"}, on a grid of meters. Arrow keys move it, plus and minus zoom, 0 shows all.`}
       style={{ width: "100%", height: `${HEIGHT}px` }} onKeyDown={keys} onPointerMove={point}
       onPointerDown={(e) => { if (view) drag.current = { x: e.clientX, y: e.clientY, north: view.north, east: view.east }; }}
       onPointerUp={() => { drag.current = null; }} />
@@ -229,7 +231,7 @@ function GridPlan(props: PlanProps) {
   </div>;
 }
 
-function drawGrid(ctx: CanvasRenderingContext2D, width: number, view: { north: number; east: number; scale: number }) {
+function drawGrid(ctx: CanvasRenderingContext2D, width: number, view: { north: number; east: number; scale: number }, up: string) {
   const mesh = round(110 / view.scale);
   ctx.clearRect(0, 0, width, HEIGHT);
   ctx.strokeStyle = color("--faint");
@@ -263,5 +265,5 @@ function drawGrid(ctx: CanvasRenderingContext2D, width: number, view: { north: n
   ctx.moveTo(20, 12);
   ctx.lineTo(24, 19);
   ctx.stroke();
-  ctx.fillText("N", 29, 22);
+  ctx.fillText(up, 29, 22);
 }

@@ -33,7 +33,8 @@ const NOTHING: Work = {
   files: [], log: {}, axes: null, trim: null, marks: [], places: null, kind: null, toml: "", name: "",
   proposal: null, options: [], proposedFor: "",
 };
-const KEY = "strapdown.studio.work";
+// Of one studio: another one at the same port has other files.
+const KEY = `strapdown.studio.work ${location.pathname}`;
 
 export interface Shared {
   state: State | null;

@@ -8,9 +8,18 @@ import { number, stamp } from "./format";
 import type { Problem, Series, Span } from "./types";
 import { color, useDark, useWidth } from "./ui";
 
-export interface Panel { title: string; unit: string; columns: { name: string; label: string }[] }
+export interface Panel {
+  title: string; unit: string; columns: { name: string; label: string }[];
+  /** Which stream it is of, where several are shown under one cursor. */
+  source?: string;
+}
 
-export type Ask = (columns: string[], view: Span, width: number, signal: AbortSignal) => Promise<Series>;
+export type Ask = (columns: string[], view: Span, width: number, signal: AbortSignal, source: string) => Promise<Series>;
+
+/** The series of each source. */
+type Sources = Record<string, Series>;
+
+const sourceOf = (panel: Panel) => panel.source ?? "";
 
 const COLORS = ["--trace1", "--trace2", "--trace3", "--trace4"];
 const HEIGHT = 180;
@@ -26,10 +35,15 @@ interface Props {
 export function Traces(props: Props) {
   const { panels, ask, whole, askKey, cursor, onCursor, trim } = props;
   const [view, setView] = useState<Span>(whole);
-  const [series, setSeries] = useState<Series | null>(null);
+  const [series, setSeries] = useState<Sources | null>(null);
   const [problem, setProblem] = useState<Problem | null>(null);
+  const [refused, setRefused] = useState("");
   const [element, width] = useWidth<HTMLDivElement>();
-  const columns = useMemo(() => panels.flatMap((p) => p.columns.map((c) => c.name)), [panels]);
+  const columns = useMemo(() => {
+    const wanted = new Map<string, string[]>();
+    for (const panel of panels) wanted.set(sourceOf(panel), [...(wanted.get(sourceOf(panel)) ?? []), ...panel.columns.map((c) => c.name)]);
+    return [...wanted];
+  }, [panels]);
   const span = whole[1] - whole[0];
 
   useEffect(() => setView(whole), [askKey, whole[0], whole[1]]);
@@ -39,12 +53,12 @@ export function Traces(props: Props) {
     const points = Math.max(200, Math.min(1200, width));
     // A drag of the wheel asks once, when it rests for a moment.
     const timer = setTimeout(() => {
-      ask(columns, view, points, control.signal).then(
-        (answer) => { setSeries(answer); setProblem(null); },
+      Promise.all(columns.map(async ([source, names]) => [source, await ask(names, view, points, control.signal, source)] as const)).then(
+        (answers) => { setSeries(Object.fromEntries(answers)); setProblem(null); },
         (error: unknown) => { if (!aborted(error)) setProblem(problemOf(error)); });
     }, series ? 60 : 0);
     return () => { clearTimeout(timer); control.abort(); };
-  }, [askKey, view[0], view[1], width, columns.join()]);
+  }, [askKey, view[0], view[1], width, JSON.stringify(columns)]);
 
   const show = (from: number, to: number) => {
     const length = Math.min(span, Math.max(to - from, span * 1e-6, 1e-4));
@@ -72,8 +86,10 @@ export function Traces(props: Props) {
     };
     if (props.onMark && cursor !== null) act["m"] = () => props.onMark!(cursor);
     if (props.onTrim && cursor !== null) {
-      act["["] = () => { if (cursor < (trim?.[1] ?? whole[1])) props.onTrim!([cursor, trim?.[1] ?? whole[1]]); };
-      act["]"] = () => { if (cursor > (trim?.[0] ?? whole[0])) props.onTrim!([trim?.[0] ?? whole[0], cursor]); };
+      const [from, to] = trim ?? whole;
+      const put = (fits: boolean, made: Span, why: string) => { setRefused(fits ? "" : why); if (fits) props.onTrim!(made); };
+      act["["] = () => put(cursor < to, [cursor, to], `The part cannot begin at the cursor: it ends at ${stamp(to, 1)} s. Put its end later first, with ].`);
+      act["]"] = () => put(cursor > from, [from, cursor], `The part cannot end at the cursor: it begins at ${stamp(from, 1)} s. Put its beginning earlier first, with [.`);
     }
     const chosen = act[event.key];
     if (!chosen) return;
@@ -94,11 +110,12 @@ export function Traces(props: Props) {
     {problem && <div class="notice bad" role="alert"><p>{problem.text}</p>{problem.remedy && <p>{problem.remedy}</p>}</div>}
     <div class="panels" tabIndex={0} role="group" onKeyDown={keys}
       aria-label="Traces over time. Arrow keys move the cursor, plus and minus zoom, page keys move the view, 0 shows all.">
-      {width > 0 && series && panels.map((panel) =>
-        <OnePanel key={panel.title} panel={panel} series={series} view={view} width={width} {...props}
+      {width > 0 && series && panels.map((panel) => series[sourceOf(panel)] &&
+        <OnePanel key={`${sourceOf(panel)}|${panel.title}`} panel={panel} series={series[sourceOf(panel)]!} view={view} width={width} {...props}
           onZoom={show} onWheel={zoom} onPan={pan} />)}
       {!series && !problem && <p class="busy" role="status"><span class="spin" aria-hidden="true" />Reading the traces…</p>}
     </div>
+    {props.onTrim && <p class="fault" role="alert">{refused}</p>}
     <Readout panels={panels} series={series} cursor={cursor} whole={whole} />
     <p class="help">Drag to zoom; double-click for all. After a click on the traces the wheel zooms too, and the keys ← → + − 0 work.{props.onTrim && " [ and ] put the beginning and the end of the part to use at the cursor, m sets a mark."}</p>
   </div>;
@@ -113,17 +130,19 @@ function indexAt(t: number[], at: number): number {
   return low > 0 && at - t[low - 1]! < t[low]! - at ? low - 1 : low;
 }
 
-function Readout({ panels, series, cursor, whole }: { panels: Panel[]; series: Series | null; cursor: number | null; whole: Span }) {
-  if (!series || cursor === null || !series.t.length) return <p class="readout soft">Point at a trace to read its values.</p>;
-  const i = indexAt(series.t, cursor);
+function Readout({ panels, series, cursor, whole }: { panels: Panel[]; series: Sources | null; cursor: number | null; whole: Span }) {
+  if (!series || cursor === null || !Object.values(series).some((one) => one.t.length)) return <p class="readout soft">Point at a trace to read its values.</p>;
   return <p class="readout" aria-live="polite">
     <b>{stamp(cursor, 1)} s</b> <span class="soft">({stamp(cursor - whole[0], 1)} s from the beginning)</span>
-    {panels.map((panel) => <span class="values" key={panel.title}>
+    {panels.map((panel) => <span class="values" key={`${sourceOf(panel)}|${panel.title}`}>
       {panel.columns.map((column, j) => {
-        const one = series.columns[column.name];
+        const own = series[sourceOf(panel)];
+        // A source that has nothing at the cursor shows nothing.
+        if (!own?.t.length || cursor < own.t[0]! || cursor > own.t[own.t.length - 1]!) return null;
+        const one = own.columns[column.name], i = indexAt(own.t, cursor);
         const low = one?.low[i], high = one?.high[i];
         if (low === null || low === undefined || high === null || high === undefined) return null;
-        return <span key={column.name}><i class={`dot t${j + 1}`} />{column.label} {low === high ? number(low) : `${number(low, 3)} to ${number(high, 3)}`} {panel.unit}</span>;
+        return <span key={column.name}><i class={`dot t${j % COLORS.length + 1}`} />{column.label} {low === high ? number(low) : `${number(low, 3)} to ${number(high, 3)}`} {panel.unit}</span>;
       })}
     </span>)}
   </p>;
@@ -206,7 +225,7 @@ function OnePanel(props: Props & {
 
   return <div class="panel">
     <div class="paneltitle"><b>{panel.title}</b> <span class="soft">{panel.unit}</span>
-      {panel.columns.map(({ label }, j) => <span class="key" key={label}><i class={`dot t${j + 1}`} />{label}</span>)}</div>
+      {panel.columns.map(({ label }, j) => <span class="key" key={label}><i class={`dot t${j % COLORS.length + 1}`} />{label}</span>)}</div>
     <div ref={place} class="plot" aria-hidden="true" />
   </div>;
 }

@@ -1,6 +1,6 @@
 // What the server of the studio answers: one interface for each table of its address book.
 
-export interface StoredFile { name: string; bytes: number; modified: number | string; folder?: boolean }
+export interface StoredFile { name: string; bytes: number; modified: number | string; folder?: boolean; /** Files of a folder, each of which may be the log. */ inside?: string[] }
 
 export interface Run {
   name: string; command: string; title: string; made: number | string; digest: string;
@@ -39,7 +39,11 @@ export interface Finding {
   file?: string;
 }
 
-export interface Column { name: string; unit: string | null }
+export interface Column {
+  name: string; unit: string | null;
+  /** Of a channel of a crash: what it shares a panel with, and its name in it. */
+  title?: string; label?: string;
+}
 
 export interface Stream {
   file?: string; name: string; rows: number; rate_hz?: number | null; from_s: number; to_s: number;
@@ -86,6 +90,8 @@ export interface Kind {
 export interface Proposal {
   toml: string; questions: Question[]; findings: Finding[]; to_check?: Question[]; found?: string[];
   others?: { toml: string; name: string }[];
+  /** Questions about the files, without whose answers there is no text. */
+  choose?: Question[];
 }
 
 export interface Fault {
@@ -104,6 +110,8 @@ export interface KeyNumber {
 }
 
 export interface RunDetail extends Run {
+  /** False where the path of a crash is along the axes of the vehicle at its entry. */
+  over_ground?: boolean;
   command_line: string; answer?: string | null; job?: string | null;
   numbers: KeyNumber[]; options: unknown; inputs: unknown; findings: Finding[];
   from_s?: number; to_s?: number;
@@ -128,6 +136,8 @@ export interface CrashQuick {
   path: { t: number[]; north: number[]; east: number[]; heading: number[]; bound: number[] };
   /** The outline: corners forward, right of the origin of positions. */
   vehicle: { length: number; width: number; outline: [number, number][] };
+  /** Whether a heading is known; else "north" is forward of the vehicle at the entry, "east" its right. */
+  over_ground: boolean;
   recorder: string; recorders: string[]; findings: Finding[]; ms: number;
 }
 

@@ -60,9 +60,12 @@ export function More({ title, open, children }: { title: ComponentChildren; open
   return <details class="more" open={open}><summary>{title}</summary><div class="moreinside">{children}</div></details>;
 }
 
-export function Trouble({ problem, retry }: { problem: Problem | null; retry?: () => void }) {
+/** What is wrong, and what to do. `take`: it takes the focus, as the answer to a button beside it. */
+export function Trouble({ problem, retry, take }: { problem: Problem | null; retry?: () => void; take?: boolean }) {
+  const own = useRef<HTMLDivElement>(null);
+  useEffect(() => { if (take && problem) own.current?.focus(); }, [problem, take]);
   if (!problem) return null;
-  return <div class="notice bad" role="alert">
+  return <div class="notice bad" role="alert" ref={own} tabIndex={-1}>
     <p><strong>{sentence(problem.text)}</strong></p>
     {problem.remedy && <p>{sentence(problem.remedy)}</p>}
     {retry && <p><button type="button" onClick={retry}>Try again</button></p>}
@@ -105,7 +108,9 @@ function OneFinding({ finding: one }: { finding: Finding }) {
 export const sentence = (text: string) => text.charAt(0).toUpperCase() + text.slice(1) + (/[.?!]$/.test(text) ? "" : ".");
 
 /** An open question: answered by one click, or by a value with its unit. */
-export function Ask({ question, onAnswer, list }: { question: Question; onAnswer: (set: Record<string, unknown>) => void; list?: boolean }) {
+export function Ask({ question, onAnswer, list, take }: { question: Question; onAnswer: (set: Record<string, unknown>) => void; list?: boolean; take?: boolean }) {
+  const own = useRef<HTMLDivElement>(null);
+  useEffect(() => { if (take) own.current?.focus(); }, [take]);
   const [text, setText] = useState("");
   const [fault, setFault] = useState("");
   const id = useId();
@@ -119,7 +124,7 @@ export function Ask({ question, onAnswer, list }: { question: Question; onAnswer
     setFault("");
     onAnswer({ [question.key]: value });
   };
-  return <div class="ask" role="group" aria-labelledby={id}>
+  return <div class="ask" role="group" aria-labelledby={id} ref={own} tabIndex={-1}>
     <p id={id}>{sentence(question.text)}{question.line ? <span class="soft"> (line {question.line})</span> : null}</p>
     {question.remedy && <p class="help">{sentence(question.remedy)}</p>}
     {question.choices.length > 0 && <div class="row">

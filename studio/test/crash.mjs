@@ -34,12 +34,36 @@ await run(async () => {
     await page.getByRole("checkbox", { checked: true }).first().waitFor();
   }
   await click(/^Look into/);
+  // Its channels are drawn, those of all its files under one cursor.
+  await see("The traces");
+  await page.locator(".plot canvas").first().waitFor();
+  const panels = await page.locator(".paneltitle").allInnerTexts();
+  assert.ok(panels.some((text) => /Acceleration/.test(text) && /m\/s²/.test(text)), panels.join("; "));
+  if (!files.length) assert.ok(panels.length === 3 && panels.some((text) => /Angular rate/.test(text)), panels.join("; "));
+  await page.locator(".panels").focus();
+  await page.keyboard.press("Home");
+  await page.keyboard.press("Shift+ArrowRight");
+  const read = await page.locator(".readout").innerText();
+  assert.match(read, /m\/s²/, "the cursor reads the channels");
+  await page.keyboard.press("m");
+  await page.getByRole("button", { name: "Remove the mark 1" }).waitFor();
+  assert.equal(await page.getByText("The part to use").count(), 0, "a case takes its records whole");
+  await look("crash-0-look");
   await page.getByRole("link", { name: "Choose what to find out" }).click();
   await page.getByRole("button", { name: "Crash", exact: true }).click();
   const text = page.getByRole("textbox", { name: "The configuration in TOML" });
   await text.waitFor();
   await page.waitForTimeout(1500);
   await look("crash-1-questions");
+  // Pressed too early, the button says why beside itself, and the focus is there.
+  await click("Run it");
+  await page.waitForFunction(() => document.activeElement?.matches(".notice[role=alert]"));
+  assert.match(await page.evaluate(() => document.activeElement.textContent), /questions? to answer first/);
+  const [button, told] = [await page.getByRole("button", { name: "Run it" }).boundingBox(), await page.locator(".notice:focus").boundingBox()];
+  assert.ok(Math.abs(told.y - button.y) < 200, "beside the button");
+  await look("crash-1-refused");
+  await click("Go to the first");
+  assert.ok(await page.evaluate(() => Boolean(document.activeElement.closest(".ask"))), "to the question");
   let asked = 0;
   for (const questions = page.locator(".ask"); await questions.count(); asked++) {
     assert.ok(asked < 40, "every answer closes its question");
@@ -50,6 +74,8 @@ await run(async () => {
   }
   assert.ok(!(await text.inputValue()).match(/= "\?"|\["\?"/), "nothing is open");
   done(`${asked} questions answered`);
+  await see(/up is forward of the vehicle at the entry/);
+  assert.equal(await page.getByText("north up").count(), 0, "no heading is known");
   const face = page.getByRole("img", { name: /^Direction of force/ });
   await face.waitFor();
   const before = await face.getAttribute("aria-label");
@@ -74,6 +100,10 @@ await run(async () => {
   await page.getByRole("link", { name: "See the result" }).waitFor({ timeout: 600_000 });
   await page.getByRole("link", { name: "See the result" }).click();
   await page.frameLocator("iframe.report").locator("h1").first().waitFor();
+  await see("The motion");
+  await page.getByText("Path, along the vehicle at the entry").first().waitFor();
+  await page.getByRole("img", { name: /^Plan of the track, up is forward/ }).waitFor();
+  await see(/since the entry/);
   await look("crash-4-result");
   done("crash");
 });

@@ -24,7 +24,13 @@ await run(async () => {
   await click("Replace it");
   expect();
   await page.getByRole("button", { name: "Replace it" }).waitFor({ state: "detached" });
-  for (const box of await page.getByRole("checkbox").all()) await box.check();
+  // What was brought is what is chosen, and nothing else of the folder.
+  const ticked = () => page.locator(".list .item:has(input:checked) .name").allInnerTexts();
+  assert.deepEqual((await ticked()).sort(), [basename(files[0])], "what was brought last is chosen");
+  await page.locator("input[type=file]").setInputFiles(files);
+  for (const file of files) { await page.getByRole("button", { name: "Use the one that is there" }).first().click(); expect(); }
+  await page.locator(".sending li").first().waitFor({ state: "detached" });
+  assert.deepEqual((await ticked()).sort(), files.map((file) => basename(file)).sort(), "what was brought is chosen");
   await look("2-files");
   done("files are there");
 
@@ -67,6 +73,20 @@ await run(async () => {
   await page.getByRole("button", { name: "Remove the mark 1" }).waitFor();
   const from = page.getByRole("textbox", { name: /^From/ });
   const first = Number(await from.inputValue());
+  // A part that cannot be says so where it was written, and what to do.
+  await from.fill("1e6");
+  await from.press("Enter");
+  const why = page.locator(".triminput .fault").first();
+  await why.getByText(/cannot begin at .* it ends at .* Move its end first/).waitFor();
+  await from.fill("soon");
+  await from.press("Enter");
+  await why.getByText(/is no number of seconds/).waitFor();
+  assert.equal(await from.getAttribute("aria-invalid"), "true");
+  await look("3-refused");
+  await from.fill("-5");
+  await from.press("Enter");
+  await page.getByText(/The log begins at/).waitFor();
+  assert.equal(Number(await from.inputValue()), first);
   await page.getByRole("slider", { name: "End of the part to use" }).press("ArrowLeft");
   await page.getByRole("button", { name: "Use all" }).click();
   assert.equal(Number(await from.inputValue()), first);
@@ -85,6 +105,7 @@ await run(async () => {
   await text.waitFor();
   await see("in step with the form");
   assert.match(await text.inputValue(), /lever_arm_m = \[0\.1, 0(\.0)?, 0(\.0)?\]/, "the drawing went into the configuration");
+  assert.match(await text.inputValue(), /\[truth\]\npath = "reference\.csv"/, "the reference is used");
   const before = await text.inputValue();
   await page.getByRole("searchbox").fill("step_s");
   await page.locator(".formside .field input").first().fill("0.2");
@@ -105,6 +126,9 @@ await run(async () => {
   await text.fill(right.replace(/^path = .*$/m, "path = 3"));
   await page.locator(".toml .findings .bad").first().waitFor();
   assert.equal(await page.locator(".gutter .wrong").count() > 0, true, "the line of the error is shown");
+  await page.getByRole("button", { name: "Run it" }).click();
+  await page.waitForFunction(() => document.activeElement?.matches(".notice[role=alert]"));
+  assert.match(await page.evaluate(() => document.activeElement.textContent), /1 error to correct first/);
   await look("5-error");
   await text.fill(right);
   await see("in step with the form");
@@ -122,6 +146,7 @@ await run(async () => {
   await page.getByRole("link", { name: "See the result" }).click();
   await see("The motion");
   await page.locator(".plot canvas").first().waitFor();
+  await page.locator(".plan .legend").getByText("reference").waitFor();
   await page.getByRole("slider", { name: "Instant" }).press("End");
   await page.getByRole("slider", { name: "Instant" }).press("PageDown");
   await page.locator(".attitude figcaption").getByText(/Heading/).waitFor();

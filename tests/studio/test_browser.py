@@ -87,7 +87,8 @@ def drive(script: str, address: str, tmp_path: Path, *words: Path) -> str:
 
 
 def test_from_files_to_a_comparison(address: str, tmp_path: Path) -> None:
-    said = drive("flow.mjs", address, tmp_path, LOGS / "imu.csv", LOGS / "gnss.csv")
+    files = [LOGS / name for name in ("imu.csv", "gnss.csv", "reference.csv")]
+    said = drive("flow.mjs", address, tmp_path, *files)
     assert "map" in said
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import shlex
 import shutil
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, DataError
 from strapdown.studio.configuration import check, command, edited, propose
 from strapdown.studio.forms import form_of, kinds, unit_of
 from strapdown.studio.kinds import KINDS
@@ -139,6 +140,227 @@ def test_the_level_of_heights_is_asked_and_taken(folder):
         )
     # Of a kind without fixes it is no key.
     assert HEIGHTS not in propose(folder, "attitude", ["log.csv"], {HEIGHTS: 0.0}, axes, {})["toml"]
+
+
+def test_the_level_of_heights_is_asked_of_fixes_that_are_read_for_it_alone(folder):
+    """A track whose heights are over the sea was refused, and could not be answered for."""
+    points = "".join(
+        f'<trkpt lat="{48.0 + 1e-5 * k:.6f}" lon="11.0"><ele>500</ele>'
+        f"<time>2026-01-01T00:00:{k:02d}Z</time></trkpt>"
+        for k in range(20)
+    )
+    head = '<gpx version="1.1" creator="x" xmlns="http://www.topografix.com/GPX/1/1">'
+    text = f"{head}<trk><trkseg>{points}</trkseg></trk></gpx>"
+    (folder / "track.gpx").write_text(text, encoding="utf-8")
+    for names in (["track.gpx"], ["log.csv", "track.gpx"]):
+        found = look(folder, names, {}, "forward-left-up")
+        asked = [q for q in found["questions"] if not q.get("optional")]
+        assert [(q["key"], q["file"]) for q in asked] == [(HEIGHTS, "track.gpx")]
+        found = look(folder, names, {HEIGHTS: 46.0}, "forward-left-up")
+        assert HEIGHTS not in {q["key"] for q in found["questions"]}
+        assert ("track.gpx", "gnss") in {(s["file"], s["name"]) for s in found["streams"]}
+
+
+def trajectory(path, *, places=True, sign=1.0):
+    """A file of fixes, or of a trajectory with the attitude beside."""
+    rows = []
+    for k in range(60):
+        row = [k, 48.0 + 1e-5 * k, 11.0, 500.0, 1.11, 0.0, 0.0, 0.0, 0.0, sign * 0.1 * k]
+        rows.append(",".join(f"{value:.6f}" for value in (row if places else row[:1] + row[7:])))
+    head = ["time_s", "lat_deg", "lon_deg", "alt_m", "VN_m_s", "VE_m_s", "VD_m_s"]
+    head = head if places else head[:1]
+    head += ["roll_deg", "pitch_deg", "heading_deg"]
+    path.write_text("\n".join([",".join(head), *rows]) + "\n", encoding="utf-8")
+
+
+def fixes_alone(path):
+    rows = [f"{k}.0,{48.0 + 1e-5 * k:.6f},11.0,500.0,1.11,0.0,0.0" for k in range(60)]
+    head = "time_s,lat_deg,lon_deg,alt_m,VN_m_s,VE_m_s,VD_m_s"
+    path.write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+
+
+def proposed(folder, kind, names, **log):
+    made = propose(folder, kind, names, log, "forward-left-up", {})
+    return made, check(folder, kind, made["toml"], {})["values"] if made["toml"] else {}
+
+
+def test_a_reference_beside_a_log_is_what_the_result_is_compared_with(folder):
+    trajectory(folder / "truth.csv")
+    fixes_alone(folder / "fixes.csv")
+    for names in (["log.csv", "fixes.csv", "truth.csv"], ["truth.csv", "fixes.csv", "log.csv"]):
+        # Fixes of their own are examined, and not the positions of the reference.
+        logs = {one["name"]: one for one in look(folder, names, {}, "forward-left-up")["logs"]}
+        assert logs["log.csv"]["fixes_from"] == "fixes.csv"
+        made, values = proposed(folder, "navigate", names)
+        assert not made["choose"]
+        assert (values["log.path"], values["truth.path"]) == ("log.csv", "truth.csv")
+        assert values["aiding.gnss.path"] == "fixes.csv"
+        assert any("truth.csv" in text for text in made["found"])
+        made, values = proposed(folder, "attitude", names)
+        assert (values["log.path"], values["attitude.reference"]) == ("log.csv", ["truth.csv"])
+        # What has no part in it is said to have none.
+        unused = {f["file"] for f in made["findings"] if f["code"] == "studio.file-not-used"}
+        assert unused == {"fixes.csv"}
+        made, values = proposed(folder, "allan", names)
+        assert "log.also" not in values
+        assert {f["file"] for f in made["findings"]} == {"fixes.csv", "truth.csv"}
+
+
+def test_an_attitude_alone_is_a_reference_for_an_attitude(folder):
+    trajectory(folder / "truth.csv", places=False)
+    found = look(folder, ["log.csv", "truth.csv"], {}, "forward-left-up")
+    assert ("truth.csv", "reference") in {(s["file"], s["name"]) for s in found["streams"]}
+    made, values = proposed(folder, "attitude", ["log.csv", "truth.csv"])
+    assert values["attitude.reference"] == ["truth.csv"]
+    words = command(folder, "attitude", "out", made["toml"], [])["words"]
+    assert "--reference=truth.csv" in words
+    # A navigation is compared with positions.
+    fixes_alone(folder / "fixes.csv")
+    made, values = proposed(folder, "navigate", ["log.csv", "fixes.csv", "truth.csv"])
+    assert "truth.path" not in values
+    said = {(f["code"], f.get("file")) for f in made["findings"]}
+    assert ("studio.reference-not-used", "truth.csv") in said
+    assert ("studio.file-not-used", "truth.csv") not in said
+
+
+def test_which_of_several_files_is_meant_is_asked(folder):
+    for name in ("one.csv", "two.csv"):
+        trajectory(folder / name)
+        fixes_alone(folder / f"fixes-{name}")
+    shutil.copy(folder / "log.csv", folder / "other.csv")
+    names = ["log.csv", "fixes-one.csv", "one.csv", "two.csv"]
+    made, values = proposed(folder, "navigate", names)
+    assert made["toml"] == "" and not values
+    (asked,) = made["choose"]
+    assert (asked["code"], asked["key"]) == ("studio.which-reference", "reference_file")
+    answers = [choice["set"]["reference_file"] for choice in asked["choices"]]
+    assert answers == ["one.csv", "two.csv", ""]
+    for answer in answers:
+        made, values = proposed(folder, "navigate", names, reference_file=answer)
+        assert values.get("truth.path", "") == answer and not made["choose"]
+    names = ["log.csv", "other.csv", "fixes-one.csv", "fixes-two.csv"]
+    made, _ = proposed(folder, "navigate", names)
+    assert [q["key"] for q in made["choose"]] == ["samples_file", "fixes_file"]
+    stated = {"samples_file": "other.csv", "fixes_file": "fixes-two.csv"}
+    made, values = proposed(folder, "navigate", names, **stated)
+    assert (values["log.path"], values["aiding.gnss.path"]) == ("other.csv", "fixes-two.csv")
+    # An answer about a file that is no longer among them is none.
+    made, _ = proposed(folder, "navigate", names[:3], samples_file="gone.csv")
+    assert [q["key"] for q in made["choose"]] == ["samples_file"]
+    # Logs of one sensor are taken together where that is what is wanted.
+    made, values = proposed(folder, "calibrate", names)
+    assert not made["choose"] and values["log.also"] == ["other.csv"]
+
+
+def test_a_trajectory_alone_is_fixes_or_a_reference_and_not_both(folder):
+    trajectory(folder / "truth.csv")
+    names = ["log.csv", "truth.csv"]
+    made, _ = proposed(folder, "navigate", names)
+    (asked,) = made["choose"]
+    assert asked["code"] == "studio.fixes-or-reference" and len(asked["choices"]) == 2
+    made, values = proposed(folder, "navigate", names, **asked["choices"][0]["set"])
+    assert values["aiding.gnss.path"] == "truth.csv" and "truth.path" not in values
+
+
+def test_a_proposal_reads_what_look_has_kept(folder, monkeypatch):
+    from strapdown.api import doctor as module
+
+    trajectory(folder / "truth.csv")
+    names = ["log.csv", "truth.csv"]
+    before = look(folder, names, {}, "forward-left-up")
+
+    def examined(*_, **__):
+        raise AssertionError("examined again")
+
+    monkeypatch.setattr(module, "doctor", examined)
+    _, values = proposed(folder, "attitude", names, from_s=1.0, to_s=50.0)
+    assert values["attitude.reference"] == ["truth.csv"] and values["log.to_s"] == 50.0
+    assert look(folder, names, {"reference_file": ""}, "forward-left-up") == before
+
+
+def crash_files(folder):
+    """Two accelerometers of a crash at their own rates, on one clock."""
+    for name, step, top in (("high.csv", 1e-4, 400.0), ("low.csv", 1e-3, 80.0)):
+        time = np.arange(-0.05, 0.2, step)
+        pulse = -top * np.sin(np.pi * np.clip(time / 0.1, 0.0, 1.0))
+        rows = np.column_stack([time, pulse, 0.1 * pulse, 0.0 * pulse])
+        head = "time [s],ax [m/s2],ay [m/s2],az [g]"
+        np.savetxt(folder / name, rows, "%.9g", ",", header=head, comments="")
+    return ["high.csv", "low.csv"]
+
+
+def test_the_channels_of_a_crash_are_drawn(folder):
+    from strapdown.studio.look import stream
+    from strapdown.studio.pyramid import StoredStream
+
+    names = crash_files(folder)
+    found = look(folder, names, {})
+    kept = {(s["file"], s["name"]): s for s in found["streams"]}
+    assert set(kept) == {("high.csv", "crash"), ("low.csv", "crash")}
+    high = kept["high.csv", "crash"]
+    assert high["rows"] == 2500 and high["rate_hz"] == pytest.approx(1e4)
+    assert high["from_s"] == pytest.approx(-0.05)
+    titles = {(c["name"], c["unit"], c["title"]) for c in high["columns"]}
+    assert ("az [g]", "m/s²", "Acceleration") in titles and len(titles) == 3
+    series = StoredStream(Path(stream(folder, "high.csv", "crash", {}))).series([], None, None, 50)
+    extremes = series["columns"]["ax [m/s2]"]
+    assert min(extremes["low"]) == pytest.approx(-400.0, rel=1e-6)
+    assert max(extremes["high"]) == pytest.approx(0.0, abs=1e-9)
+    # A second look, and a stream that is not there.
+    assert look(folder, names, {}) == found
+    for name in ("crash-2", "../crash", ".."):
+        with pytest.raises((ConfigError, DataError)):
+            stream(folder, "high.csv", name, {})
+
+
+NHTSA = """\
+----- EV5 -----
+----- TEST -----
+V5|a title|an aim|03/OCT/2017|MGA|DTNH|BT17|NCA|VTB|CON|DRY|22|OTH|OTH|36|0|0|0|3|none
+----- INSTRUMENTATION -----
+1|93|AC|NA|FLLR|XG|SEC|G'S|2800|M|D|800|21|36|-2|3|100|AM|P|LEFT REAR CROSSMEMBER
+1|94|AC|NA|FLLR|ZG|SEC|G'S|2800|M|D|800|21|36|-2|3|100|AM|P|LEFT REAR CROSSMEMBER
+1|95|AV|01|HDCG|YL|SEC|DPS|2800|M|D||21|36|-2|1|100|AM|P|DRIVER HEAD
+----- END -----
+"""
+
+
+def test_a_test_of_a_laboratory_is_a_record_with_the_files_that_it_names(folder):
+    """The folder of a test is no log; the channels of one clock are one stream."""
+    place = folder / "test"
+    place.mkdir()
+    (place / "v00042.EV5").write_text(NHTSA)
+    for number, last in ((93, 4), (94, 4), (95, 2)):
+        curve = "".join(f"{1e-4 * k:.6f}\t{k + 0.5}\n" for k in range(-2, last))
+        (place / f"v00042.{number:03d}").write_text(curve)
+    found = look(folder, ["test"], {})
+    (log,) = found["logs"]
+    assert log["format"]["name"] == "nhtsa" and log["fit"]["crash"]["answer"] == "with limits"
+    assert not log["faults"]
+    first, second = found["streams"]
+    assert [(s["name"], s["rows"]) for s in (first, second)] == [("crash", 6), ("crash-2", 4)]
+    assert first["rate_hz"] == pytest.approx(1e4)
+    place_of = "Acceleration, vehicle 1, LEFT REAR CROSSMEMBER"
+    titles = [(c["name"], c["label"], c["title"], c["unit"]) for c in first["columns"]]
+    assert titles == [("93", "93 x", place_of, "m/s²"), ("94", "94 z", place_of, "m/s²")]
+    (rate,) = second["columns"]
+    assert rate["unit"] == "rad/s" and rate["title"].startswith("Angular rate, vehicle 1, DRIVER")
+    # The samples of a header are in files of their own: a change of these is another log.
+    header = "test/v00042.EV5"
+    before = look(folder, [header], {})["streams"]
+    assert before and look(folder, [header], {})["streams"] == before
+    (place / "v00042.093").write_text((place / "v00042.093").read_text().replace("0.5", "0.7"))
+    after = look(folder, [header], {})["streams"]
+    assert {s["key"] for s in after}.isdisjoint(s["key"] for s in before)
+
+
+def test_a_part_is_no_part_of_a_case_and_that_is_said(folder):
+    names = crash_files(folder)
+    made = propose(folder, "crash", names, {"from_s": 0.0, "to_s": 0.1}, None, {})
+    (said,) = (f for f in made["findings"] if f["code"] == "studio.part-not-used")
+    assert "0 to 0.1 s" in said["text"] and made["toml"]
+    made = propose(folder, "crash", names, {}, None, {})
+    assert "studio.part-not-used" not in {f["code"] for f in made["findings"]}
 
 
 def test_what_is_proposed_is_right_and_stays_so_after_a_change(folder):

@@ -28,12 +28,25 @@ def test_a_sample_is_copied_and_can_be_looked_at(fresh, name):
     assert all((fresh.folder / file).is_file() for file in files)
     assert fresh.ask("POST", f"api/samples/{name}").json == made.json
     kind = "crash" if name == "crash" else "navigate"
-    chosen = [file for file in files if "reference" not in file]
-    proposed = fresh.ask("POST", "api/propose", {"kind": kind, "files": chosen})
-    assert proposed.status == 200 and f'"{chosen[0]}"' in proposed.json["toml"]
+    proposed = fresh.ask("POST", "api/propose", {"kind": kind, "files": files})
+    assert proposed.status == 200 and not proposed.json["choose"]
+    assert all(f'"{file}"' in proposed.json["toml"] for file in files)
     (fresh.folder / files[0]).write_text("mine", encoding="utf-8")
     assert fresh.ask("POST", f"api/samples/{name}").code == "studio.name-taken"
     assert (fresh.folder / files[0]).read_text(encoding="utf-8") == "mine"
+
+
+def test_a_folder_shows_what_is_in_it_and_one_of_it_is_a_log(fresh):
+    folder = fresh.folder / "recordings"
+    folder.mkdir()
+    for name in ("b.csv", "A.csv", ".hidden"):
+        (folder / name).write_text("time_s,gyro_x_rad_s\n0.0,1.0\n", encoding="utf-8")
+    (folder / "out").symlink_to(fresh.folder.parent)
+    (one,) = fresh.ask("GET", "api/state").json["files"]
+    assert one["inside"] == ["recordings/A.csv", "recordings/b.csv"]
+    # Each of them can be looked at; that these say too little is another thing.
+    found = fresh.ask("POST", "api/look", {"files": ["recordings/A.csv"], "log": {}})
+    assert found.status == 200 or found.code.startswith("io.")
 
 
 def test_a_sample_that_is_none(studio):

@@ -118,6 +118,7 @@ def test_a_navigation_is_that_of_the_command(fresh, tmp_path):
     result = same_by_both(fresh, tmp_path, "navigate", "drive", short_drive())
     track = fresh.ask("GET", "api/runs/drive/track?points=50").json
     assert len(track["lat"]) == 50 and len(track["q"][0]) == 4
+    assert fresh.ask("GET", "api/runs/drive").json["over_ground"]
     assert fresh.ask("GET", "api/runs/drive").json["verdict"] in (
         "trusted",
         "reserve",
@@ -159,6 +160,12 @@ def test_a_crash_is_that_of_the_command_and_the_quick_answer_is_its_own(fresh, t
     assert quick["path"]["north"][-1] == pytest.approx(end["value"], rel=1e-9)
     # The half axis of an ellipse in the plane is longer than the bound along one axis.
     assert quick["path"]["bound"][-1] > end["high"] - end["value"]
+    # No heading is stated: the axes are those of the vehicle at the entry, everywhere.
+    assert not quick["over_ground"] and not fresh.ask("GET", "api/runs/pole").json["over_ground"]
+    turned = {"toml": text, "set": {"entry.heading_deg": 30.0}}
+    assert fresh.ask("POST", "api/crash/quick", turned).json["over_ground"]
+    page = (result / "report.html").read_text(encoding="utf-8")
+    assert "north up" not in page and "axes forward and right of the vehicle at the entry" in page
     faster = {"toml": text, "set": {"entry.speed_m_per_s": 9.0}}
     moved = fresh.ask("POST", "api/crash/quick", faster).json
     assert moved["path"]["north"][-1] > quick["path"]["north"][-1] + 1.0

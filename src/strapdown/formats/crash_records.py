@@ -15,7 +15,7 @@ from strapdown.formats.crash_record import CrashRecord, clean
 from strapdown.formats.crash_table import record_of
 from strapdown.formats.signs import Signs
 
-__all__ = ["CRASH_READERS", "CrashReader", "detect", "read", "read_crash_record"]
+__all__ = ["CRASH_READERS", "CrashReader", "detect", "read", "read_crash_record", "stated_format"]
 
 
 # Logs of inertial sensors as crash records: arrays, phones, MATLAB, HDF5.
@@ -129,6 +129,19 @@ CRASH_READERS: dict[str, CrashReader] = {
         "text table with a column a channel: .csv .txt", Path.is_file, "crash_table"
     ),
 }
+
+
+#: Formats that hold nothing but records of crashes, and say so.
+_STATED = ("nhtsa", "mme", "json", "edr")
+
+
+def stated_format(path: Path) -> str | None:
+    """Return the key of the format of a record that says itself that it is of a crash.
+
+    None of any other file, such as a table, whose columns may be those of anything.
+    """
+    found = (name for name in _STATED if path.exists() and CRASH_READERS[name].detect(path))
+    return next(found, None)
 
 
 def read_crash_record(

@@ -12,6 +12,7 @@ from strapdown.constants import DEG_PER_HOUR, MICRO_G, STANDARD_GRAVITY, TWO_SID
 from strapdown.units import FORCES, LENGTHS, MASSES, MOMENTS, SHOWN_UNITS, SPEEDS, ShownUnits
 
 if TYPE_CHECKING:
+    from strapdown.config.crash_case import CaseSpec
     from strapdown.crash.case import CaseResult
     from strapdown.crash.delta_v_bound import VelocityChange
     from strapdown.crash.pdof import AngleInterval
@@ -269,7 +270,12 @@ def side_words(forward: float, right: float) -> str:
 
 def over_ground(result: CaseResult) -> bool:
     """Whether a heading is known, so that the path is given over ground."""
-    entry = result.spec.entry
+    return has_heading(result.spec)
+
+
+def has_heading(spec: CaseSpec) -> bool:
+    """Whether a case states a heading, or fixes give it."""
+    entry = spec.entry
     return entry.kind == "gnss" or (entry.kind == "speed" and bool(entry.heading_deg))
 
 

@@ -66,7 +66,7 @@ def propose(
     -------
     dict
         ``toml``, ``questions``, ``findings``; ``found``: what it rests on; ``others``: of further
-        vehicles.
+        vehicles. ``choose``: questions about the files, without whose answers ``toml`` is empty.
     """
     one = _kind(kind)
     place = Folder(folder)
@@ -83,6 +83,7 @@ def propose(
         "to_check": _questions(text, first.to_check),
         "findings": [told(finding) for finding in first.findings],
         "found": list(first.found),
+        "choose": list(first.choose),
         "others": [
             {"toml": other.text, "name": str(other.name or k)}
             for k, other in enumerate(others, start=2)

@@ -27,6 +27,8 @@ __all__ = ["STATE", "Folder", "Limits", "plain_name"]
 STATE = ".strapdown-studio"
 #: Longest name, bytes of UTF-8; entries of a folder that are looked at.
 LONGEST, MOST_ENTRIES = 200, 5000
+#: Files of one folder that are listed.
+MOST_INSIDE = 500
 #: Characters that some system gives a meaning in a name.
 _MARKS = frozenset('/\\:*?"<>|')
 #: Files by which a folder is a session of a live run.
@@ -196,8 +198,11 @@ class Folder:
                 yield entry
 
     def files(self) -> list[dict[str, Any]]:
-        """List the files, and the folders that are no results: name, bytes, time of change in s."""
-        found = []
+        """List the files, and the folders that are no results: name, bytes, time of change in s.
+
+        A folder has ``inside``, the names of what is in it.
+        """
+        found: list[dict[str, Any]] = []
         for entry in self.entries():
             with suppress(OSError):
                 folder = entry.is_dir()
@@ -208,9 +213,20 @@ class Folder:
                     continue
                 about = entry.stat()
                 size = _size(Path(entry.path)) if folder else about.st_size
-                one = {"name": entry.name, "bytes": size, "modified": about.st_mtime}
-                found.append({**one, "folder": True} if folder else one)
+                one: dict[str, Any] = {"name": entry.name, "bytes": size}
+                one["modified"] = about.st_mtime
+                if folder:
+                    one |= {"folder": True, "inside": self._inside(Path(entry.path))}
+                found.append(one)
         return sorted(found, key=lambda one: str(one["name"]).lower())
+
+    def _inside(self, folder: Path) -> list[str]:
+        """Names of the files in a folder, each of which may be a log of its own."""
+        found = []
+        for path in islice(folder.iterdir(), MOST_ENTRIES):
+            with suppress(OSError, ConfigError):
+                found.append(self.name_of(self.file(self.name_of(path))))
+        return sorted(found, key=str.lower)[:MOST_INSIDE]
 
     def _sessions(self, folder: Path) -> list[dict[str, Any]]:
         """List the sessions in the folder of a live run, each of which is a log."""

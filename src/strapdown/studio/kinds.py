@@ -6,9 +6,11 @@ options; their file here has the same keys under ``[log]``, and becomes these op
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -32,14 +34,17 @@ from strapdown.config.spec import (
 from strapdown.config.toml_text import Asked, Page, inline, string
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.bridge import target_of
-from strapdown.studio.questions import of_each
+from strapdown.studio.questions import HEIGHTS, ROLES, of_each, role_question
 
 __all__ = ["KINDS", "Draft", "Kind"]
 
 
 @dataclass(frozen=True)
 class Draft:
-    """A proposed configuration: its text, what it rests on, and what is open."""
+    """A proposed configuration: its text, what it rests on, and what is open.
+
+    `choose`: questions about the files, without whose answers there is no text.
+    """
 
     text: str
     found: tuple[str, ...] = ()
@@ -47,6 +52,7 @@ class Draft:
     to_check: tuple[Asked, ...] = ()
     findings: tuple[Finding, ...] = ()
     name: str = ""
+    choose: tuple[dict[str, Any], ...] = ()
 
 
 Paths = Sequence[Path]
@@ -87,46 +93,169 @@ def _log_table(path: Path, keys: Keys) -> LogTable:
     return specify(LogTable, path=str(path), **of_each(keys)[0])
 
 
-def _sorted_files(paths: Paths, keys: Keys, axes: str | None) -> tuple[Path, Path | None]:
-    """Return the log of inertial samples, and the file of fixes among the others."""
-    from strapdown.api.doctor import doctor
+@dataclass(frozen=True)
+class Roles:
+    """What each of several files is for.
 
-    if len(paths) == 1:
-        return paths[0], None
-    of_log, of_fixes = of_each(keys)
-    reading = {k: v for k, v in of_log.items() if k not in ("from_s", "to_s", "duration_s")}
-    logs = {str(path): path for path in paths}
-    inertial, fixes = [], []
-    for path in logs.values():
-        try:
-            one = doctor(str(path), axes=axes, gnss=of_fixes or None, **reading).logs[0]
-        except DataError:
-            continue
-        if "imu" in one.streams or one.questions:
-            inertial.append(path)
-        elif "gnss" in one.streams:
-            fixes.append(path)
-    log = (inertial or list(paths))[0]
-    return log, next((path for path in fixes if path != log), None)
+    Attributes
+    ----------
+    samples : Path
+        The log of inertial samples.
+    fixes, reference : Path or None
+        The file of fixes, and the one of a reference, which may be the log itself.
+    within : bool
+        Whether the reference is the attitude in the log itself, which is read with its samples.
+    asked : tuple of dict
+        Questions, where several files could be meant and none was said to be.
+    findings : tuple of Finding
+        Of files that are not used.
+    """
+
+    samples: Path
+    fixes: Path | None = None
+    reference: Path | None = None
+    within: bool = False
+    asked: tuple[dict[str, Any], ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+
+#: Kinds whose results are compared with a reference.
+COMPARED = ("navigate", "attitude")
+
+
+def _compared(kind: str, path: Path, columns: set[str], *, within: bool) -> bool:
+    """Whether a kind can be compared with a reference that has these columns.
+
+    `within`: whether it is in the log itself, whose attitude is read with its samples.
+    """
+    from strapdown.formats.references import read_truth
+
+    if kind != "attitude":
+        return kind == "navigate" and {"lat", "lon"} <= columns
+    if within and "q_w" in columns:
+        return True
+    with suppress(DataError):
+        return path.is_file() and not read_truth(path).empty
+    return False
+
+
+def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
+    """Return what each file is for, by what `look` found in it; a person may have said it."""
+    from strapdown.studio.look import look
+
+    own = {path.as_posix(): path for path in paths}
+    found = look(Path.cwd(), list(own), keys, axes)
+    held: dict[str, dict[str, set[str]]] = {name: {} for name in own}
+    for one in found["streams"]:
+        held[one["file"]][one["name"]] = {column["name"] for column in one["columns"]}
+    asks = [(q["file"], q["key"]) for q in found["questions"] if not q.get("optional")]
+    # What is open about heights is open about fixes.
+    of_fixes = {file for file, key in asks if key == HEIGHTS}
+    of_samples = {file for file, key in asks if key != HEIGHTS}
+    inertial = [name for name in own if "imu" in held[name] or name in of_samples]
+    asked: list[dict[str, Any]] = []
+
+    def one_of(role: str, names: list[str], none: str = "") -> str | None:
+        said = keys.get(ROLES[role])
+        if said is not None and (said in own or said == ""):
+            return said or None
+        if len(names) > 1:
+            asked.append(role_question(role, names, none=none))
+        return names[0] if names else None
+
+    samples = one_of("samples", inertial) or next(iter(own))
+    others = [name for name in own if name not in inertial]
+    references: list[str] = []
+    other: list[str] = []
+    for name in (samples, *others):
+        if "reference" in held[name]:
+            fits = _compared(kind, own[name], held[name]["reference"], within=name == samples)
+            (references if fits else other).append(name)
+    fixes = reference = None
+    if kind == "navigate":
+        # A trajectory is fixes, too, if one reads its positions alone: where there are no others.
+        with_fixes = [n for n in (samples, *others) if "gnss" in held[n] or n in of_fixes]
+        plain = [name for name in with_fixes if name == samples or name not in references]
+        if not plain and len(with_fixes) == 1 and ROLES["fixes"] not in keys:
+            question = role_question("fixes", with_fixes, none="It is a reference")
+            asked.append({**question, **_either(with_fixes[0])})
+        fixes = one_of("fixes", plain or with_fixes)
+    if kind in COMPARED:
+        left = [name for name in references if name != fixes or name == samples]
+        reference = one_of("reference", left, none="None of them")
+    used = {samples, fixes, reference}
+    if kind in ("allan", "calibrate"):
+        used |= set(inertial)
+    findings = [
+        Finding("studio.file-not-used", severity="note", file=name)
+        for name in own
+        if name not in used and not (kind in COMPARED and name in other)
+    ]
+    if kind in COMPARED:
+        data = {"kind": KINDS[kind].title.lower()}
+        findings += [
+            Finding("studio.reference-not-used", severity="note", file=name, data=data)
+            for name in other
+        ]
+    return Roles(
+        own[samples],
+        None if fixes is None else own[fixes],
+        None if reference is None else own[reference],
+        reference == samples and "q_w" in held[samples].get("reference", set()),
+        tuple(asked),
+        tuple(findings),
+    )
+
+
+def _either(name: str) -> dict[str, Any]:
+    """Words of the question whether a trajectory is the fixes, or what they are compared with."""
+    said = Finding("studio.fixes-or-reference", severity="error", file=name)
+    return {
+        "code": said.code,
+        "text": said.sentence("file"),
+        "remedy": said.advice("file"),
+        "file": name,
+        "choices": [
+            {"label": "Its positions are the fixes", "set": {ROLES["fixes"]: name}},
+            {
+                "label": "It is a reference, to hold the result against",
+                "set": {ROLES["fixes"]: "", ROLES["reference"]: name},
+            },
+        ],
+    }
 
 
 def _draft_navigation(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
     from strapdown.systems.navigation_draft import draft_navigation
 
-    log, fixes = _sorted_files(paths, keys, axes)
-    of_fixes = of_each(keys)[1]
+    roles = _roles("navigate", paths, keys, axes)
+    if roles.asked:
+        return [Draft("", choose=roles.asked)]
+    log, of_fixes = roles.samples, of_each(keys)[1]
+    fixes = None if roles.fixes == log else roles.fixes
     known = fixes is not None or of_fixes
     gnss = specify(FixesTable, path=str(fixes or log), **of_fixes) if known else None
-    return [
-        Draft(**vars(draft_navigation(_log_table(log, keys), folder=Path(), axes=axes, gnss=gnss)))
-    ]
+    truth = roles.reference
+    table = _log_table(log, keys)
+    made = draft_navigation(table, folder=Path(), axes=axes, gnss=gnss, truth=truth)
+    return [_drafted(made, roles)]
 
 
 def _draft_alignment(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
     from strapdown.systems.alignment_draft import draft_alignment
 
-    log, _ = _sorted_files(paths, keys, axes)
-    return [Draft(**vars(draft_alignment(_log_table(log, keys), folder=Path(), axes=axes)))]
+    roles = _roles("align", paths, keys, axes)
+    if roles.asked:
+        return [Draft("", choose=roles.asked)]
+    return [
+        _drafted(draft_alignment(_log_table(roles.samples, keys), folder=Path(), axes=axes), roles)
+    ]
+
+
+def _drafted(made: Any, roles: Roles) -> Draft:
+    """A proposed configuration, with what is said of the files that it does not use."""
+    draft = Draft(**vars(made))
+    return replace(draft, findings=(*draft.findings, *roles.findings))
 
 
 def _draft_crash(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
@@ -139,8 +268,13 @@ def _draft_crash(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
         if path.resolve() not in seen:
             records.append(read_crash_record(path))
             seen |= {file.resolve() for file in (*records[-1].files, path)}
+    begin, end = keys.get("from_s"), keys.get("to_s")
+    part: tuple[Finding, ...] = ()
+    if begin is not None or end is not None:
+        data = {"begin": begin or 0.0, "end": math.inf if end is None else end}
+        part = (Finding("studio.part-not-used", data=data),)
     return [
-        Draft(one.text, one.found, one.asked, one.to_check, one.findings, one.vehicle)
+        Draft(one.text, one.found, one.asked, one.to_check, (*one.findings, *part), one.vehicle)
         for one in draft_cases(records, folder=Path())
     ]
 
@@ -264,7 +398,12 @@ def _draft_of_options(table: str, what: str, example: Iterable[tuple[str, str, s
     """Return the draft of a kind with options: the log as it was read, and keys with defaults."""
 
     def draft(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
-        first, *others = paths
+        roles = _roles(table, paths, keys, axes)
+        if table == "attitude" and roles.asked:
+            return [Draft("", choose=roles.asked)]
+        unused = {f.file for f in roles.findings}
+        first = roles.samples
+        others = [one for one in paths if one != first and one.as_posix() not in unused]
         spec = _log_table(first, keys)
         page = Page()
         page.say(what.format(name=first.name))
@@ -284,7 +423,14 @@ def _draft_of_options(table: str, what: str, example: Iterable[tuple[str, str, s
         page.table(f"[{table}]")
         for key, value, remark in example:
             page.key(key, value, remark)
-        return [Draft(page.text)]
+        found = []
+        if roles.reference is not None and not roles.within:
+            listed = string(roles.reference.as_posix())
+            page.key("reference", f"[{listed}]", "the attitude to compare with")
+            found.append(
+                f"{roles.reference.as_posix()}: a reference, to compare the attitudes with"
+            )
+        return [Draft(page.text, tuple(found), findings=roles.findings)]
 
     return draft
 

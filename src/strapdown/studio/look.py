@@ -11,20 +11,22 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from strapdown.bundle import sha256, source_digest
-from strapdown.errors import ConfigError, DataError
-from strapdown.studio.folder import Folder
+from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
+from strapdown.studio.folder import Folder, plain_name
 from strapdown.studio.pyramid import LIST, write_stream
 from strapdown.studio.questions import (
     HEIGHTS,
+    ROLES,
     axes_question,
     heights_question,
     of_each,
@@ -40,6 +42,10 @@ __all__ = ["CACHE", "kept_stream", "look", "stream"]
 CACHE = 4 << 30
 #: Names of the parts of the result: gaps and rests that are listed at most.
 MOST = 500
+#: Endings of headers of crash tests, whose samples are in files of their own.
+HEADERS = (".ev5", ".mme")
+#: Lists of what `look` finds.
+PARTS = (*("logs", "between", "said", "uses", "findings", "questions", "streams", "rests", "gaps"),)
 #: Units of columns of the tables, by the name, or its beginning before ``_``.
 UNITS = {
     **dict.fromkeys(("gyro_x", "gyro_y", "gyro_z"), "rad/s"),
@@ -91,7 +97,14 @@ def look(
     # Names, not paths: nothing that is shown tells where the folder is, in which this process is.
     by_name = {place.name_of(path): path for path in paths}
     of_log, of_fixes = of_each(keys)
-    made = doctor(list(by_name), axes=axes, gnss=of_fixes or None, **of_log)
+    try:
+        made = doctor(list(by_name), axes=axes, gnss=of_fixes or None, **of_log)
+    except DataError as error:
+        # Fixes alone, of which only the level of their heights is open: that is asked, too.
+        asked = _heights_of([error.finding], by_name)
+        if not asked:
+            raise
+        return {**{part: [] for part in PARTS}, "questions": asked}
     streams: list[dict[str, Any]] = []
     for one in made.logs:
         path = by_name[Path(one.log.path).as_posix()]
@@ -108,6 +121,11 @@ def look(
                 "rate_hz": rates.get(name),
             }
             streams.append({**about, **listed})
+        if one.data["crash_record"]:
+            for name, about, listed in _channels(_cache(place) / own, path):
+                streams.append(
+                    {"file": place.name_of(path), "key": own, "name": name, **about, **listed}
+                )
     first = next((one for one in made.logs if "imu" in one.streams), made.logs[0])
     gaps = []
     if "imu" in first.streams:
@@ -119,13 +137,92 @@ def look(
         "said": [headline(one) for one in made.logs],
         "uses": [{use: one.answer(use) for use in uses(one)} for one in made.logs],
         "findings": [told(f) for one in made.logs for f in (*one.faults, *one.notes)],
-        "questions": _questions(made.logs, keys.get("columns", {})),
+        "questions": [
+            *_questions(made.logs, keys.get("columns", {})),
+            *_heights_of(made.between, by_name),
+        ],
         "streams": streams,
         "rests": [[rest.start, rest.end] for rest in first.rests[:MOST]],
         "gaps": gaps,
     }
     _written(kept, found)
     _forget(_cache(place))
+    return found
+
+
+#: Quantities of the channels of a crash, as they are called above their curves.
+CHANNELS = {
+    "acceleration": "Acceleration",
+    "rate": "Angular rate",
+    "velocity": "Velocity",
+    "displacement": "Displacement",
+    "force": "Force",
+    "": "As recorded",
+}
+
+
+def _channels(folder: Path, path: Path) -> Iterator[tuple[str, dict[str, Any], dict[str, Any]]]:
+    """Keep the channels of a record of a crash, those with the same stamps as one stream.
+
+    Yields the name of the stream, its rate, and its list, whose columns have ``title`` and
+    ``label``, too: those of one quantity at one place share a title. Values are in SI where the
+    unit is known, else as recorded.
+    """
+    from strapdown.formats.crash_record import QUANTITIES
+    from strapdown.formats.crash_records import read_crash_record
+
+    groups: list[tuple[NDArray[np.float64], dict[str, NDArray[np.float64]], list[Any]]] = []
+    for channel in read_crash_record(path).channels:
+        if channel.quantity not in CHANNELS:
+            continue
+        # One without stamps or values is said by `doctor`, or by the proposed case.
+        with suppress(DataError):
+            time, values = channel.load()
+            if not time.size or time.size != values.size or not np.isfinite(time).all():
+                continue
+            same = (g for g in groups if np.array_equal(g[0], time))
+            group = next(same, None)
+            if group is None:
+                groups.append(group := (time, {}, []))
+            group[1][channel.name] = np.asarray(values, dtype=np.float64)
+            group[2].append(channel)
+    for k, (time, values_of, channels) in enumerate(groups, start=1):
+        name = "crash" if k == 1 else f"crash-{k}"
+        units = {c.name: QUANTITIES.get(c.quantity, "") if c.unit else "" for c in channels}
+        table = pd.DataFrame(values_of, pd.Index(time, name="time"))
+        listed = _keep(
+            folder, name, table, {c: u.replace("m/s2", "m/s²") for c, u in units.items()}
+        )
+        columns = [
+            {**column, "title": _title(one), "label": _label(one)}
+            for column, one in zip(listed["columns"], channels, strict=True)
+        ]
+        length = float(time.max() - time.min())
+        rate = (time.size - 1) / length if length > 0.0 else None
+        yield name, {"rate_hz": rate}, {**listed, "columns": columns}
+
+
+def _title(channel: Any) -> str:
+    """Quantity and place of a channel: what the channels of one sensor have in common."""
+    where = [channel.vehicle and f"vehicle {channel.vehicle}", channel.place]
+    body = "" if channel.body == "vehicle" else channel.body
+    if body and body.lower() not in channel.place.lower():
+        where.append(body)
+    return ", ".join([CHANNELS[channel.quantity], *(one for one in where if one)])
+
+
+def _label(channel: Any) -> str:
+    """Name of a channel; with its axis, where the name is a number."""
+    return f"{channel.name} {channel.axis}".strip() if channel.name.isdigit() else channel.name
+
+
+def _heights_of(unread: Sequence[Finding], names: Mapping[str, Path]) -> list[dict[str, Any]]:
+    """Return the questions for the level of the heights of files that were not read for it."""
+    found = []
+    for one in unread:
+        name = next((n for n in names if Path(n).name == one.file), str(one.file))
+        asked = heights_question(one, name)
+        found += [] if asked is None else [asked]
     return found
 
 
@@ -147,7 +244,7 @@ def stream(
     """Return the folder of a kept stream, from the cache; it is read if it is not there."""
     place = Folder(folder)
     path = place.file(file)
-    at = _cache(place) / _key([path], _reading(log), axes or None) / name
+    at = _cache(place) / _key([path], _reading(log), axes or None) / plain_name(name)
     if not (at / LIST).is_file():
         found = look(folder, [file], log, axes)
         if not (at / LIST).is_file():
@@ -180,7 +277,7 @@ def _reading(log: Mapping[str, Any]) -> dict[str, Any]:
         *("format", "columns", "gyro_unit", "accel_unit", "time_unit", "sampling", "rate_hz"),
         *("repair", "calibration", HEIGHTS),
     )
-    part = ("path", "from_s", "to_s", "duration_s")
+    part = ("path", "from_s", "to_s", "duration_s", *ROLES.values())
     for key in log:
         if key not in known and key not in part:
             raise ConfigError("studio.unknown-key", word=str(key), known=known)
@@ -200,10 +297,16 @@ def _key(paths: Sequence[Path], keys: Mapping[str, Any], axes: str | None) -> st
 
 
 def _digest(path: Path) -> str:
-    """Digest of a file, or of all files of a folder."""
+    """Digest of a file with those that it names, or of all files of a folder."""
     if path.is_file():
-        about = path.stat()
-        return _known_digest(path, about.st_size, about.st_mtime_ns)
+        own = [path]
+        if path.suffix.lower() in HEADERS:
+            from strapdown.formats.crash_records import read_crash_record
+
+            with suppress(StrapdownError):
+                own = sorted({path, *read_crash_record(path).files})
+        parts = [(one, one.stat()) for one in own]
+        return " ".join(_known_digest(p, a.st_size, a.st_mtime_ns) for p, a in parts)
     files = sorted(p for p in path.rglob("*") if p.is_file())
     return hashlib.sha256(
         json.dumps([[p.relative_to(path).as_posix(), sha256(p)] for p in files]).encode()

@@ -5,7 +5,7 @@ An answer sets keys of the table ``[log]``, or ``axes``; what the file itself su
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from strapdown.config.toml_text import Asked
@@ -15,15 +15,20 @@ from strapdown.units import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
 
 __all__ = [
     "HEIGHTS",
+    "ROLES",
     "axes_question",
     "heights_question",
     "of_each",
     "open_question",
     "question_of",
+    "role_question",
 ]
 
 #: Key of a table ``[log]`` of the studio that is of the fixes: their level over the ellipsoid, m.
 HEIGHTS = "datum_height_m"
+#: Keys of a table ``[log]`` of the studio: which of several files is meant, by its name; empty for
+#: none of them.
+ROLES = {"samples": "samples_file", "fixes": "fixes_file", "reference": "reference_file"}
 #: Findings about heights whose level only a person knows.
 HEIGHTS_OPEN = (
     "io.height-level-not-stated",
@@ -113,9 +118,29 @@ def heights_question(finding: Finding, file: str) -> dict[str, Any] | None:
 
 
 def of_each(keys: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Divide keys into those of samples and those of fixes."""
+    """Divide keys into those of samples and those of fixes, without those of `ROLES`."""
     fixes = {HEIGHTS: keys[HEIGHTS]} if HEIGHTS in keys else {}
-    return {key: value for key, value in keys.items() if key != HEIGHTS}, fixes
+    others = (HEIGHTS, *ROLES.values())
+    return {key: value for key, value in keys.items() if key not in others}, fixes
+
+
+def role_question(role: str, names: Sequence[str], *, none: str = "") -> dict[str, Any]:
+    """Return the question which of several files has a role.
+
+    Parameters
+    ----------
+    role : str
+        Of `ROLES`.
+    names : sequence of str
+        Of the files that could have it.
+    none : str
+        Label of the answer that none of them has it; without it there is no such answer.
+    """
+    finding = Finding(f"studio.which-{role}", severity="error", data={"names": list(names)})
+    key = ROLES[role]
+    choices = [_choice(name, {key: name}) for name in names]
+    choices += [_choice(none, {key: ""})] if none else []
+    return {**_question(finding, "", key, choices, None), "file": None}
 
 
 def open_question(asked: Asked, key: str, unit: str, count: int) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from strapdown.dsp.chi_square import plane_bound
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.report.crash_outline import vehicle_outline
+from strapdown.report.values import has_heading
 from strapdown.studio.configuration import checked
 from strapdown.studio.kinds import KINDS
 from strapdown.studio.reading_process import told
@@ -54,7 +55,8 @@ def quick(folder: Path, toml: str, changes: Mapping[str, Any], unit: int = 0) ->
     dict
         ``delta_v`` (value and bound, m/s; None without an event), ``pdof`` (deg, and the hour of
         the clock), ``path`` with the longer half axis of the ellipse of each point, m;
-        ``vehicle``, ``recorder``, and ``ms`` that it took.
+        ``over_ground``: whether a heading is known; without one ``north`` is forward of the vehicle
+        at the entry, and ``east`` its right. ``vehicle``, ``recorder``, and ``ms`` that it took.
     """
     begun = time.perf_counter()
     spec = checked(folder, KINDS["crash"], toml, changes=changes)
@@ -105,6 +107,7 @@ def quick(folder: Path, toml: str, changes: Mapping[str, Any], unit: int = 0) ->
             "width": spec.vehicle.width_m,
             "outline": outline.body.tolist(),
         },
+        "over_ground": has_heading(spec),
         "recorder": made.name,
         "recorders": [one.name for one in spec.units],
         "findings": [told(finding) for finding in made.findings],

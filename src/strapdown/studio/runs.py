@@ -124,6 +124,8 @@ def file_in(place: Path, path: str, manifest: Mapping[str, Any]) -> Path:
 def run(folder: Path, name: str) -> dict[str, Any]:
     """Return the numbers, options, inputs and findings of a result."""
     place, manifest = _opened(folder, name)
+    from strapdown.report.compare_numbers import is_over_ground
+
     answer = _answer(place, manifest)
     span: dict[str, Any] = {"from_s": None, "to_s": None}
     with suppress(StrapdownError):
@@ -140,6 +142,8 @@ def run(folder: Path, name: str) -> dict[str, Any]:
             {key: one.get(key) for key in ("role", "name", "kept", "sha256", "bytes")}
             for one in manifest["inputs"]
         ],
+        # Without a heading the path of a crash is along the axes of the vehicle at its entry.
+        "over_ground": manifest["command"] != "crash" or is_over_ground(answer),
         "findings": [_finding(one) for one in _list(answer, "findings")[:MOST]],
         "versions": manifest["versions"],
         "command_line": _repeating(manifest, name),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -38,9 +39,11 @@ from strapdown.formats import (
 )
 from strapdown.formats.aid_table import read_stream
 from strapdown.formats.clocks import clock_of, on_clock_of
+from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import ABSENT, PLACEHOLDERS, RawLog, Recording
+from strapdown.formats.references import read_truth
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.frames import ways_between
 from strapdown.navigation.measurements.gnss_clock import time_offset
@@ -219,6 +222,8 @@ def run_doctor(spec: DoctorSpec, progress: Progress = silent) -> Diagnosis:
     if not logs:
         raise unread[0]
     alone = [k for k, one in enumerate(logs) if "gnss" in one.streams and "imu" not in one.streams]
+    # The positions of a reference are fixes where there are no others.
+    alone.sort(key=lambda k: "reference" in logs[k].streams)
     for k, one in enumerate(logs):
         if alone and "imu" in one.streams and "gnss" not in one.streams:
             fixes = logs[alone[0]]
@@ -251,7 +256,8 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
     if inertial.imu is None and reader is not None:
         raw = _columns(log.path, form)
     missing = inertial.refused
-    if not streams and raw is None:
+    record = None if streams or raw is not None or log.format else _stated_record(log.path)
+    if not streams and raw is None and record is None:
         assert missing is not None
         lacking = missing.code in ABSENT and not inertial.questions
         raise DataError(next((f for f in findings if lacking and f.severity == "error"), missing))
@@ -264,7 +270,10 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
         findings += _reference_against(streams)
     clock, found = _fixes_against(streams)
     findings += found
-    if missing is not None and not inertial.questions:
+    if record is not None:
+        findings += record.findings
+        missing = None
+    elif missing is not None and not inertial.questions:
         if not streams:
             findings.append(missing)
         elif missing.code not in ABSENT:
@@ -280,7 +289,7 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
     flags = flags_of(inertial.log, axes)
     data: dict[str, Any] = {
         "name": Path(log.path).resolve().name,
-        "format": None if reader is None else {"name": form, "title": reader.title},
+        "format": _format(form, reader, record),
         "options": flags,
         "fixes_options": flags_of_fixes(fixes),
         "answers_inferred": dict(inertial.answers),
@@ -295,7 +304,11 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
         "fixes_from": None,
         "fixes_for": None,
         "impact": impact,
-        "crash_record": None if of_another else _crash_record(log.path, lacks),
+        "crash_record": len(record.channels)
+        if record is not None
+        else None
+        if of_another
+        else _crash_record(log.path, lacks),
         "temperature": _temperature(streams),
     }
     one = LogDiagnosis(
@@ -438,6 +451,9 @@ def _others(
         except DataError as error:
             if "reference" in held and error.finding.code not in ABSENT:
                 findings.append(error.finding.replace(severity="warning"))
+            if TABLE in held and recording is None and "gnss" not in streams:
+                with suppress(DataError):
+                    streams["reference"] = read_truth(Path(log.path))
     for name in ("magnetometer", "barometer", "wheel"):
         if name not in held:
             continue
@@ -450,6 +466,25 @@ def _others(
             findings.append(error.finding.replace(severity="warning"))
     # A stream that shares the reading of another has its findings, too.
     return streams, list(dict.fromkeys(findings))
+
+
+def _stated_record(path: str) -> CrashRecord | None:
+    """Return a record whose format says that it is of a crash; None of any other file.
+
+    DataError: it is one, and cannot be read.
+    """
+    from strapdown.formats.crash_records import read_crash_record, stated_format
+
+    return None if stated_format(Path(path)) is None else read_crash_record(path)
+
+
+def _format(form: str, reader: Reader | None, record: CrashRecord | None) -> dict[str, str] | None:
+    """Return name and title of the format that a log was read by."""
+    if record is not None:
+        from strapdown.formats.crash_records import CRASH_READERS
+
+        return {"name": record.format, "title": CRASH_READERS[record.format].title}
+    return None if reader is None else {"name": form, "title": reader.title}
 
 
 def _columns(path: str, form: str) -> RawLog | None:

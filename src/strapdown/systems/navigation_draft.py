@@ -63,6 +63,7 @@ def draft_navigation(
     gnss: FixesTable | None = None,
     sensor: str | None = None,
     foot: bool = False,
+    truth: Path | None = None,
     progress: Progress = silent,
 ) -> ProposedAlignment:
     """Write the proposed navigation configuration of a log.
@@ -77,6 +78,8 @@ def draft_navigation(
         As `propose`.
     foot : bool
         Whether the unit is on a shoe: zero-velocity updates at its stances (`on_foot`).
+    truth : Path, optional
+        A reference trajectory, to compare the result with.
     """
     made = propose(log, axes=axes, gnss=gnss, sensor=sensor, progress=progress)
     progress("magnetometer and other measurements", 0.9)
@@ -122,7 +125,9 @@ def draft_navigation(
     for name in ("mechanization", "filter", "damping", "smoother", "recorder"):
         stage(page, STAGES[name], made.table.get(name, {}))
     found += _aids(page, made, magnetic, folder, foot)
-    _rest(page, foot)
+    if truth is not None:
+        found.append(f"{truth.name}: a reference trajectory, to compare the result with")
+    _rest(page, foot, None if truth is None else named_from(truth, folder))
     return ProposedAlignment(
         page.text, tuple(found), tuple(page.asked), made.findings, tuple(page.to_check)
     )
@@ -469,14 +474,18 @@ def _other(slot: Slot, kinds: Sequence[str]) -> list[str]:
     ]
 
 
-def _rest(page: Page, foot: bool) -> None:
+def _rest(page: Page, foot: bool, truth: str | None) -> None:
     page.table(
         "[output]",
         "Forms of the trajectory: csv, parquet, kml, geojson, gpx, geoparquet, nav, tum.",
     )
     page.key("files", '["csv", "kml", "geojson"]')
     page.blank()
-    page.say("[truth] and path = …: a reference trajectory, to hold the answer beside")
+    if truth is None:
+        page.say("[truth] and path = …: a reference trajectory, to hold the answer beside")
+    else:
+        page.table("[truth]", "A reference trajectory, to hold the answer beside.")
+        page.key("path", string(truth))
     if foot:
         page.say(
             "[control_points] and path = …: a table of time, north, east of places that it was at, "
