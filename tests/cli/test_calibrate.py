@@ -147,7 +147,7 @@ def test_what_is_left_enters_the_filters(result, logs, run_cli, tmp_path):
         (["gravity=9.8"], 4, "--gravity 9.8"),
         (["lat_deg=48"], 4, "--lat 48"),
         (["--to", "1.5", "--from", "0"], 0, "not observed"),
-        (["--from", "2.2", "--to", "2.8"], 3, "rest"),
+        (["--from", "2.2", "--to", "2.8"], 3, "poses.csv, log: the logs show no rest"),
     ],
 )
 def test_what_it_refuses_and_what_it_says(logs, run_cli, tmp_path, options, code, word):

@@ -144,9 +144,13 @@ class _Module:
             joined = " ||\n              ".join(tests) or "0"
             lines.append(f"        if (!({joined})) {{")
             arguments = ", ".join(f"a{k}" for k in range(count))
+            unlocked = function.kernel.nogil
+            if unlocked:
+                lines.append("            PyThreadState *volatile state = NULL;")
             leave = [
                 "            int why = setjmp(*table->leave());",
                 "            if (why) {",
+                *["                if (state) PyEval_RestoreThread(state);"] * unlocked,
                 "                sd_let_go(&held);",
                 "                table->reset();",
                 "                int line;",
@@ -156,24 +160,19 @@ class _Module:
             ]
             lines += leave if function.can_raise else ["#ifdef SD_BOUNDS", *leave, "#endif"]
             call = f"table->{function.name}({arguments})"
-            threads = function.kernel.nogil
-            if function.result is None:
-                if threads:
-                    raise ValueError("without the lock: only with a result")
-                lines += [
-                    f"            {call};",
-                    "            sd_let_go(&held);",
-                    "            Py_RETURN_NONE;",
-                ]
+            if function.result is not None:
+                lines.append(f"            {self.names(function.result)} x;")
+                call = f"x = {call}"
+            if unlocked:
+                lines.append("            state = PyEval_SaveThread();")
+                lines.append(f"            {call};")
+                lines.append("            PyEval_RestoreThread(state);")
             else:
-                if threads:
-                    lines.append(f"            {self.names(function.result)} x;")
-                    lines.append("            PyThreadState *state = PyEval_SaveThread();")
-                    lines.append(f"            x = {call};")
-                    lines.append("            PyEval_RestoreThread(state);")
-                else:
-                    lines.append(f"            {self.names(function.result)} x = {call};")
-                lines.append("            sd_let_go(&held);")
+                lines.append(f"            {call};")
+            lines.append("            sd_let_go(&held);")
+            if function.result is None:
+                lines.append("            Py_RETURN_NONE;")
+            else:
                 if holds_memory(function.result):
                     lines.append(f"            PyObject *o = {self.maker(function.result)}(x);")
                     lines += ["            table->reset();", "            return o;"]

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from strapdown._kernels.compilation import njit
+import numpy as np
+
+from strapdown._kernels.compilation import dot, njit
+
+#: Samples of a part of a record.
+CHUNK = 2048
 
 
 @njit(cache=True, error_model="numpy")
@@ -15,81 +20,78 @@ def integrate(rate, mean, phase):
         phase[k + 1] = total
 
 
-@njit(cache=True, error_model="numpy")
-def overlapping_variances(phase, m, out):
+@njit(cache=True, error_model="numpy", forceinline=True)
+def accumulate(x, n, start):
+    """Put running sums from a start in place of the first n numbers of a row; return the last."""
+    # Of four parts at once, so that an addition need not wait for the one before it.
+    part = n // 4
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    y, z, w = x[part:], x[2 * part :], x[3 * part :]
+    for k in range(part):
+        a += x[k]
+        x[k] = a
+        b += y[k]
+        y[k] = b
+        c += z[k]
+        z[k] = c
+        d += w[k]
+        w[k] = d
+    b = a + b
+    c = b + c
+    d = c + d
+    for k in range(part):
+        x[k] += start
+        y[k] += start + a
+        z[k] += start + b
+        w[k] += start + c
+    total = start + d
+    for k in range(4 * part, n):
+        total += x[k]
+        x[k] = total
+    return total
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def overlapping_variances(phase, factors, out):
     """Fill the sums of squares of three differences of a phase over m samples, and their counts.
 
-    out: of second differences; of their running sums over m; of third differences; then how many
-    of each there are. With the phase a sum of samples, the first is 2 m² times the overlapping
-    Allan variance, the second 2 m⁴ times the modified one, the third 6 m² times the Hadamard one,
-    each times its count.
+    factors: the values of m. out (factors, 6): of second differences; of their running sums over m;
+    of third differences; then how many of each there are. With the phase a sum of samples, the
+    first is 2 m² times the overlapping Allan variance, the second 2 m⁴ times the modified one, the
+    third 6 m² times the Hadamard one, each times its count. Other threads run meanwhile.
     """
     n = phase.shape[0]
-    for j in range(6):
-        out[j] = 0.0
-    second = n - 2 * m
-    third = n - 3 * m
-    # Four sums, so that an addition need not wait for the one before it.
-    a0, a1, a2, a3 = 0.0, 0.0, 0.0, 0.0
-    k = 0
-    while k + 4 <= second:
-        d0 = phase[k + 2 * m] - 2.0 * phase[k + m] + phase[k]
-        d1 = phase[k + 1 + 2 * m] - 2.0 * phase[k + 1 + m] + phase[k + 1]
-        d2 = phase[k + 2 + 2 * m] - 2.0 * phase[k + 2 + m] + phase[k + 2]
-        d3 = phase[k + 3 + 2 * m] - 2.0 * phase[k + 3 + m] + phase[k + 3]
-        a0 += d0 * d0
-        a1 += d1 * d1
-        a2 += d2 * d2
-        a3 += d3 * d3
-        k += 4
-    while k < second:
-        d0 = phase[k + 2 * m] - 2.0 * phase[k + m] + phase[k]
-        a0 += d0 * d0
-        k += 1
-    out[0] = (a0 + a1) + (a2 + a3)
-    out[3] = second
-    if third < 1:
-        return
-    # Of four parts of the record, each with its own running sum.
-    part = third // 4
-    r0, r1, r2, r3 = 0.0, 0.0, 0.0, 0.0
-    for k in range(m):
-        r0 += phase[k + 2 * m] - 2.0 * phase[k + m] + phase[k]
-        i = k + part
-        r1 += phase[i + 2 * m] - 2.0 * phase[i + m] + phase[i]
-        i += part
-        r2 += phase[i + 2 * m] - 2.0 * phase[i + m] + phase[i]
-        i += part
-        r3 += phase[i + 2 * m] - 2.0 * phase[i + m] + phase[i]
-    b0, b1, b2, b3 = r0 * r0, 0.0, 0.0, 0.0
-    a0, a1, a2, a3 = 0.0, 0.0, 0.0, 0.0
-    for k in range(part):
-        d0 = phase[k + 3 * m] - 3.0 * phase[k + 2 * m] + 3.0 * phase[k + m] - phase[k]
-        i = k + part
-        d1 = phase[i + 3 * m] - 3.0 * phase[i + 2 * m] + 3.0 * phase[i + m] - phase[i]
-        i += part
-        d2 = phase[i + 3 * m] - 3.0 * phase[i + 2 * m] + 3.0 * phase[i + m] - phase[i]
-        i += part
-        d3 = phase[i + 3 * m] - 3.0 * phase[i + 2 * m] + 3.0 * phase[i + m] - phase[i]
-        a0 += d0 * d0
-        a1 += d1 * d1
-        a2 += d2 * d2
-        a3 += d3 * d3
-        # The sum after the last third difference ends with the last second difference.
-        r0 += d0
-        r1 += d1
-        r2 += d2
-        r3 += d3
-        b0 += r0 * r0
-        b1 += r1 * r1
-        b2 += r2 * r2
-        b3 += r3 * r3
-    for k in range(4 * part, third):
-        d3 = phase[k + 3 * m] - 3.0 * phase[k + 2 * m] + 3.0 * phase[k + m] - phase[k]
-        a3 += d3 * d3
-        r3 += d3
-        b3 += r3 * r3
-    out[1] = (b0 + b1) + (b2 + b3)
-    out[4] = third + 1
-    out[2] = (a0 + a1) + (a2 + a3)
-    out[5] = third
+    count = factors.shape[0]
+    second, third, running = np.empty(CHUNK), np.empty(CHUNK), np.zeros(count)
+    for j in range(count):
+        m = factors[j]
+        for c in range(6):
+            out[j, c] = 0.0
+        out[j, 3] = n - 2 * m
+        if n > 3 * m:
+            for k in range(m):
+                running[j] += phase[k + 2 * m] - 2.0 * phase[k + m] + phase[k]
+            out[j, 1] = running[j] * running[j]
+            out[j, 4] = n - 3 * m + 1
+            out[j, 5] = n - 3 * m
+    # A part of the record at a time, for all m, as a part stays in the cache.
+    for begin in range(0, n, CHUNK):
+        for j in range(count):
+            m = factors[j]
+            size = min(CHUNK, n - 2 * m - begin)
+            if size < 1:
+                continue
+            x0, x1, x2 = phase[begin:], phase[begin + m :], phase[begin + 2 * m :]
+            for k in range(size):
+                second[k] = x2[k] - 2.0 * x1[k] + x0[k]
+            out[j, 0] += dot(second, second, size)
+            size = min(CHUNK, n - 3 * m - begin)
+            if size < 1:
+                continue
+            x3 = phase[begin + 3 * m :]
+            for k in range(size):
+                third[k] = (x3[k] - 2.0 * x2[k] + x1[k]) - second[k]
+            out[j, 2] += dot(third, third, size)
+            # The sum after the last third difference ends with the last second difference.
+            running[j] = accumulate(third, size, running[j])
+            out[j, 1] += dot(third, third, size)

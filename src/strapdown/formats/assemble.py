@@ -153,7 +153,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
             questions.refuse()
             raise
     questions.refuse()
-    if finite.all() and stamps.keep.all():
+    whole = bool(finite.all() and stamps.keep.all())
+    if whole:
         kept = filled(finite.size, lambda part: np.arange(part.start, part.stop), np.int64)
         time = stamps.seconds
     else:
@@ -201,7 +202,11 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     factors = {t: factor_of(unit, {**UNITS[t], **SUMS[t]}) for t, (unit, _) in units.items()}
     for begin in range(0, kept.size, AT_ONCE):
         rows = slice(begin, begin + AT_ONCE)
-        used = {triad: values[triad][kept[rows]] for triad in units}
+        used = {
+            # A copy, as the body axes may take the memory of the sensor's.
+            triad: values[triad][rows].copy(order="K") if whole else values[triad][kept[rows]]
+            for triad in units
+        }
         for triad in units:
             _turn(used[triad], axes, factors[triad], body[triad][rows])
             let_go(values[triad])

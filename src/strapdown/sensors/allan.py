@@ -58,15 +58,15 @@ def deviations(
     if n < 3 or not chosen.size or chosen[0] < 1 or 2 * chosen[-1] > n:
         raise DataError("allan.too-short", samples=n, least=LEAST_SAMPLES)
     sums, scale = np.zeros((chosen.size, 6)), chosen.astype(np.float64)
-    parts, own = np.zeros(chosen.size), np.empty(6)
+    parts = np.zeros(chosen.size)
     for values in records:
         phase = np.empty(values.size + 1)
         integrate(values, float(values.mean()), phase)
-        for k, m in enumerate(chosen.tolist()):
-            if 2 * m <= values.size:
-                overlapping_variances(phase, m, own)
-                sums[k] += own
-                parts[k] += values.size / m - 1.0
+        short = int(np.searchsorted(chosen, values.size // 2, side="right"))
+        own = np.empty((short, 6))
+        overlapping_variances(phase, chosen[:short], own)
+        sums[:short] += own
+        parts[:short] += values.size / chosen[:short] - 1.0
     with np.errstate(divide="ignore", invalid="ignore"):
         found = {
             "allan": np.sqrt(sums[:, 0] / (2.0 * sums[:, 3])) / scale,

@@ -173,7 +173,8 @@ class CalibrationProblem:
             if one.rate is not None
         ]
         if not nodes and not rates:
-            raise DataError("calibrate.no-rest", quantity="log")
+            logs = [str(one.imu.attrs["source"]) for one in records if one.imu.attrs.get("source")]
+            raise DataError("calibrate.no-rest", file=", ".join(logs) or None, quantity="log")
         stretches = []
         still = [n.rest.gyro_mean for n in nodes if not n.held]
         bias = np.mean(still, axis=0) if still else np.zeros(3)

@@ -307,8 +307,11 @@ def _calibrated(m: Array, x: Array) -> tuple[Array, Array, Array, Array]:
     return np.linalg.norm(v, axis=1) - x[FIELD], v, off, A
 
 
-def _residual(m: Array, x: Array, soft: bool = True) -> tuple[Array, Array]:
-    """Strength less the field's, (n,), and its derivatives, (n, 9); (n, 4) without soft iron."""
+def strength_residual(m: Array, x: Array, soft: bool = True) -> tuple[Array, Array]:
+    """Strength less the field's, (n,), and its derivatives, (n, 9); (n, 4) without soft iron.
+
+    `m`: readings, (n, 3); `x`: hard iron, field and, along `SHAPES`, soft iron, (9,).
+    """
     e, v, off, A = _calibrated(m, x)
     unit = v / np.maximum(np.linalg.norm(v, axis=1), 1e-9)[:, None]
     columns = [-unit @ A, -np.ones(len(m))]
@@ -335,7 +338,7 @@ def _fit(m: Array, start: Array, free: tuple[slice, ...]) -> _Fit:
     for _ in range(ROUNDS):
         damping = 0.0
         for _ in range(STEPS):
-            e, J = _residual(m, x, SOFT in free)
+            e, J = strength_residual(m, x, SOFT in free)
             weight = np.minimum(1.0, HUBER * scatter / np.maximum(np.abs(e), 1e-12))
             information = weight / (scatter**2 * correlated)
             J = J[:, open_[: J.shape[1]]]
@@ -356,7 +359,7 @@ def _fit(m: Array, start: Array, free: tuple[slice, ...]) -> _Fit:
                 damping = max(10.0 * damping, 1e-4)
             if damping >= 1e6 or np.abs(step).max() < 1e-6:
                 break
-        e, J = _residual(m, x)
+        e, J = strength_residual(m, x)
         own = np.linalg.inv(normal)
         if SOFT not in free and OFFSET in free:
             # Soft iron that is not looked for is there all the same.

@@ -12,14 +12,18 @@ from strapdown import rotation
 from strapdown.dsp.chi_square import chi_square_exceeded
 from strapdown.sensors.magnetometer import (
     CHANCE,
+    FIELD,
     IRON,
+    OFFSET,
     OFFSET_PRIOR,
     SHAPES,
+    SOFT,
     SOFT_PRIOR,
     MagnetometerCalibration,
     calibrate_magnetometer,
     change_of_direction,
     direction_sd,
+    strength_residual,
 )
 
 Array = NDArray[np.float64]
@@ -41,8 +45,8 @@ ISOTROPIC = (0.8, 0.95, 1.0)
 LINE = 100.0
 #: Steps of the fit at most, and the one at which it ends.
 STEPS, SMALL = 30, 1e-7
-#: Unknowns: hard iron, field, soft iron, rotation, vertical part of the field.
-OFFSET, FIELD, SOFT, TURN, DIP, UNKNOWNS = slice(0, 3), 3, slice(4, 9), slice(9, 12), 12, 13
+#: Unknowns beside hard iron, field and soft iron: rotation, vertical part of the field.
+TURN, DIP, UNKNOWNS = slice(9, 12), 12, 13
 
 
 def calibrate_by_poses(
@@ -157,15 +161,10 @@ class _Fit:
 
     def _strength(self, m: Array) -> tuple[Array, Array]:
         """Strength less the field's, (n,), and its derivatives, (n, 13)."""
-        A = self.iron()
-        off = m - self.x[OFFSET]
-        v = off @ A
-        strength = np.linalg.norm(v, axis=1)
-        unit = v / np.maximum(strength, 1e-9)[:, None]
+        left, by_iron = strength_residual(m, self.x[: TURN.start])
         J = np.zeros((len(m), UNKNOWNS))
-        J[:, OFFSET], J[:, FIELD] = -unit @ A, -1.0
-        J[:, SOFT] = np.einsum("ni,kij,nj->nk", unit, SHAPES, off)
-        return strength - self.x[FIELD], J
+        J[:, : TURN.start] = by_iron
+        return left, J
 
     def _vertical(self) -> tuple[Array, Array, Array]:
         """Vertical part less the field's, (p,), derivatives, and covariance by the vectors up."""

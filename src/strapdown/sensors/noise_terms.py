@@ -34,7 +34,8 @@ TWO_SIDED, ONE_SIDED = 3.841, 2.706
 WELL_KNOWN = 0.1
 #: A level whose shapes exceed the model by this share, beyond 5 standard deviations, is colored.
 COLORED, SURELY = 0.05, 5.0
-ITERATIONS = 40
+#: Steps of a fit at most; and gain in log-likelihood, expected or seen, below which it ends.
+ITERATIONS, NO_GAIN = 40, 1e-5
 #: Least variance, in units of that of the record; and furthest end of an interval, logarithms.
 TINY, FURTHEST = 1e-30, 30.0
 #: Correlation times of a Gauss-Markov process in a record, at least: a slower one is a random walk,
@@ -265,6 +266,8 @@ class _Record:
             # A term that the record does not show has no information; it shrinks by steps.
             inner = inner + 1e-3 * np.eye(len(free))
             step = np.clip(np.linalg.solve(inner, slope[free]), -3.0, 3.0)
+            if 0.5 * float(slope[free] @ step) < NO_GAIN:
+                break
             size = 1.0
             while size > 1e-3:
                 trial = log.copy()
@@ -277,7 +280,7 @@ class _Record:
                 break
             gained = new - value
             log, value, slope, information = trial, new, s, i
-            if gained < 1e-5:
+            if gained < NO_GAIN:
                 break
         return _Fit(names, np.exp(log), value, information, correlation)
 

@@ -313,9 +313,7 @@ def _procedure(
     ups = [np.array(r.accel_mean) for one in records for r in one.rests if r.accel_mean is not None]
     ups = [up / np.linalg.norm(up) for up in ups]
     poses = _distinct(ups)
-    if not poses:
-        if magnetometer is None:
-            raise DataError("calibrate.no-rest", quantity="log")
+    if not poses and magnetometer is not None:
         return "magnetometer"
     faces = [up for up in poses if np.abs(up).max() > math.cos(FACE_WITHIN)]
     sides = {(int(np.abs(up).argmax()), bool(up[np.abs(up).argmax()] > 0.0)) for up in faces}

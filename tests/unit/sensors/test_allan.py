@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from strapdown._kernels.allan import CHUNK
 from strapdown.errors import DataError
 from strapdown.sensors.allan import (
     allan_model,
@@ -47,6 +48,24 @@ def test_deviations_are_those_of_allantools(kind):
     # Sums of 400 numbers of order one in another order: some hundred roundings.
     np.testing.assert_allclose(found[kind], REFERENCE[kind], rtol=1e-12)
     np.testing.assert_allclose(found.index, [0.01, 0.02, 0.05, 0.1, 0.4, 1.0], rtol=1e-15)
+
+
+def test_deviations_of_a_record_of_several_parts_are_those_of_their_definition():
+    """The kernel takes a part of the record at a time, and carries running sums over its end."""
+    rate = np.tile(series(), 13)
+    rate += 0.1 * np.arange(rate.size) % 7.0
+    x = np.append(0.0, np.cumsum(rate - rate.mean()))
+    factors = [1, 3, 40, 700, 1700]
+    assert rate.size > 2 * CHUNK
+    found = deviations(rate, 0.01, factors)
+    for m, row in zip(factors, found.to_dict("records"), strict=True):
+        second = x[2 * m :] - 2.0 * x[m:-m] + x[: -2 * m]
+        third = second[m:] - second[:-m]
+        means = np.convolve(second, np.full(m, 1.0 / m), "valid")
+        squares = [np.mean(one**2) / m**2 for one in (second, means, third)]
+        wanted = np.sqrt(np.array(squares) / [2.0, 2.0, 6.0])
+        # Sums of 5200 numbers that a running sum passes on: some thousand roundings.
+        np.testing.assert_allclose(list(row.values())[:3], wanted, rtol=1e-11)
 
 
 def test_averaging_times_are_even_on_a_logarithm_and_the_mean_does_not_matter():

@@ -131,6 +131,13 @@ def test_known_turns_are_matched_by_angle_and_refused_otherwise():
     with pytest.raises(DataError) as caught:
         calibrate_imu([replace(one, rests=())], conditions=EXACT)
     assert caught.value.finding.code == "calibrate.no-rest"
+    assert caught.value.finding.file is None
+    logs = [replace(one, rests=(), imu=one.imu.copy()) for _ in range(2)]
+    for log, name in zip(logs, ("first.csv", "second.csv"), strict=True):
+        log.imu.attrs["source"] = name
+    with pytest.raises(DataError) as caught:
+        calibrate_imu(logs, conditions=EXACT)
+    assert caught.value.finding.file == "first.csv, second.csv"
 
 
 @pytest.mark.slow
