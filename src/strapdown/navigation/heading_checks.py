@@ -419,8 +419,8 @@ def heading_checks_of(
     thinned = {aid.name: _thinned(tables[aid.name]) for aid in aids}
     fixes = {aid.name: aid.epochs(thinned[aid.name]) for aid in aids}
     begun = float(time[0] - rows[0, 0])
-    warming = chain.navigator.warming
-    alone = Navigator(small, aids, mark_interval=FIXES_APART, warming=warming)
+    own = chain.navigator
+    alone = Navigator(small, aids, mark_interval=FIXES_APART, warming=own.warming, wrong=own.wrong)
     return HeadingChecks(alone, time, rows, thinned, fixes, begun)
 
 

@@ -70,6 +70,7 @@ from strapdown.navigation.record import (
     InnovationRecords,
     NavigationChunk,
 )
+from strapdown.navigation.recovery import Wrong
 
 if TYPE_CHECKING:
     from strapdown.navigation.smoother import RauchTungStriebel
@@ -186,6 +187,8 @@ class Navigator:
         What a smoothed run is linearized about; the filter's own estimates, if not given.
     warming : Warming, optional
         Change of the biases of a unit that becomes warm.
+    wrong : tuple of Wrong
+        Stretches over which an earlier run went wrong.
 
     Raises
     ------
@@ -200,6 +203,7 @@ class Navigator:
     smoother: RauchTungStriebel | None = None
     about: Reference | None = None
     warming: Warming | None = None
+    wrong: tuple[Wrong, ...] = ()
 
     def __post_init__(self) -> None:
         if self.smoother is not None and not self.damping.corrects:
@@ -503,21 +507,28 @@ class EpochLoop:
     def _next_warming(self, time: Array) -> int:
         """Index of the next step after which a warming unit is told of; their number if none is."""
         warming = self.navigator.warming
-        if warming is None:
-            return len(time)
-        return int(time.searchsorted(warming.due(self.warmed, self.begun)))
+        due = [one.due(self.warmed) for one in self.navigator.wrong]
+        if warming is not None:
+            due.append(warming.due(self.warmed, self.begun))
+        return int(time.searchsorted(min(due))) if due else len(time)
 
     def _warm(self) -> None:
         """Add to the uncertainty of the biases by which these changed as the unit became warmer."""
         warming, engine = self.navigator.warming, self.engine
-        assert warming is not None
         engine.close()
-        model = self.navigator.filter.model
+        filter_ = self.navigator.filter
+        model = filter_.model
         Q = np.zeros((model.layout.size, model.layout.size))
-        for name, variance in warming.variances(self.warmed, engine.time, self.begun).items():
-            if name in model.layout.places:
-                own = np.arange(model.layout.size)[model.layout[name]]
-                Q[own, own] = variance
+        if warming is not None:
+            for name, variance in warming.variances(self.warmed, engine.time, self.begun).items():
+                if name in model.layout.places:
+                    own = np.arange(model.layout.size)[model.layout[name]]
+                    Q[own, own] = variance
+        noise = sum(one.covariance(self.warmed, engine.time) for one in self.navigator.wrong)
+        if np.any(noise):
+            state = engine.filter
+            E = model.from_physical(filter_.mechanization, state.time, state.row)[:, :9]
+            Q += E @ noise @ E.T
         engine.carry(np.eye(model.physical_size), Q)
         self.warmed = engine.time
 

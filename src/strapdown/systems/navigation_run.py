@@ -28,7 +28,8 @@ from strapdown.config.navigation import (
     make_filter,
 )
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
-from strapdown.errors import Finding, StrapdownError
+from strapdown.errors import DivergenceError, Finding, StrapdownError
+from strapdown.estimation.robust import DOUBT
 from strapdown.evaluation.trajectory_differences import (
     DifferenceSummary,
     summarise_differences,
@@ -57,6 +58,7 @@ from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import GapPolicy, ImuPreprocessor, ends_of
 from strapdown.navigation.record import NavigationRecord, Span, innovation_labels
 from strapdown.navigation.recorder import IntervalRecorder, Recorder
+from strapdown.navigation.recovery import longest, wrong_stretches
 from strapdown.navigation.replay import PipelineRun, relinearized, run_batch
 from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import load_sensor
@@ -95,6 +97,8 @@ GRADES, COARSER = ("tactical-grade", "industrial-grade", "consumer-grade"), 3.0
 #: Gain in the logarithm of the likelihood from which another sensor explains a record: in all, and
 #: for each component. Innovations are correlated: a record has fewer independent ones.
 LEAST_GAIN, GAIN_EACH = 20.0, 0.05
+#: How often a run is repeated at most that is contradicted for longer than receivers are at fault.
+RECOVERIES = 4
 #: An estimated time offset, s, over which a run is repeated with it, and by how many of its
 #: standard deviations it differs from zero.
 CONTINUED, SURELY = 0.05, 3.0
@@ -183,6 +187,15 @@ def run_navigation(
             begun_with = chain
         if by_offset:
             run = drive(chain, source.imu, source.tables, recorder, show_mode)
+        chain, run, by_recovery = _recovered(
+            chain,
+            run,
+            source.tables,
+            lambda other: drive(other, source.imu, source.tables, recorder, show_mode),
+        )
+        begun_with = replace(
+            begun_with, navigator=replace(begun_with.navigator, wrong=chain.navigator.wrong)
+        )
         if run.smoothed is not None:
 
             def show_pass(mode: str, share: float) -> None:
@@ -269,7 +282,7 @@ def run_navigation(
         *_lost_start(chain, source.imu, best.trajectory),
         *_unsettled(run),
         *by_grade,
-        *in_file(by_offset, *tables),
+        *in_file((*by_offset, *by_recovery), *tables),
     ]
     return NavigationRun(
         spec=spec,
@@ -391,6 +404,49 @@ def _with_known_offsets(
     if findings:
         chain = replace(chain, navigator=with_aids(chain.navigator, tuple(aids)))
     return chain, tuple(findings)
+
+
+def _recovered(
+    chain: NavigationPipeline,
+    run: PipelineRun,
+    tables: Mapping[str, pd.DataFrame],
+    drive: Callable[[NavigationPipeline], PipelineRun],
+) -> tuple[NavigationPipeline, PipelineRun, tuple[Finding, ...]]:
+    """Repeat a run whose solution was contradicted, with the noise that explains where it went.
+
+    The noise belongs to the whole stretch since the last fix that agreed: filter and smoother then
+    see its error as one of that stretch, and take the fixes after it. As often as that explains the
+    measurements better, rejected ones included.
+    """
+    findings: tuple[Finding, ...] = ()
+    first = run.record
+    for _ in range(RECOVERIES):
+        found = wrong_stretches(run.record.innovations, tables)
+        if not found or (not findings and longest(found) < DOUBT):
+            break
+        wrong = (*chain.navigator.wrong, *found)
+        other = replace(chain, navigator=replace(chain.navigator, wrong=wrong))
+        try:
+            again = drive(other)
+        except DivergenceError:
+            break
+        gain, _ = likelihood_gain(run.record.innovations, again.record.innovations)
+        if gain < LEAST_GAIN:
+            break
+        chain, run = other, again
+        findings = (
+            Finding(
+                "navigation.run-again-with-noise",
+                severity="warning",
+                quantity="position",
+                count=len(wrong),
+                begin=min(one.begin for one in wrong),
+                end=max(one.end for one in wrong),
+                rejected=_rejected(first),
+                left=_rejected(run.record),
+            ),
+        )
+    return chain, run, findings
 
 
 def _known_offset(aid: Gnss, error: pd.Series, sd: pd.Series) -> tuple[float, float] | None:

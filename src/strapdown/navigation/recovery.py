@@ -1,0 +1,202 @@
+"""Stretches of a run over which its solution went wrong beyond its bounds, and their noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.estimation.robust import DOUBT, FEW, Igg3
+from strapdown.frames import place_difference
+from strapdown.navigation.measurements.gnss import PLACE, SPEED
+from strapdown.navigation.record import innovation_labels
+from strapdown.tables import GEODETIC
+from strapdown.tables.checks import index_of, values_of
+
+__all__ = ["Wrong", "longest", "wrong_stretches"]
+
+Array = NDArray[np.float64]
+
+#: Parts of a stretch after which its noise is told of.
+PARTS = 20
+#: Innovation, in standard deviations, that a rule rejects: one that is taken was forced.
+REJECTED = Igg3().k1
+#: Acceleration by which an inertial solution may be wrong, m/s².
+SWING = 3.0
+#: A receiver that goes no farther than this part of the contradiction stands.
+STANDS = 0.1
+#: Velocities that together show whether a position changed as they say, and part of the change.
+TOGETHER, CONFIRMS = 3, 0.3
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """Stretch since the last observation that agreed, over which a solution went wrong.
+
+    Its error is taken for one of the whole stretch: half of the variance by white accelerations,
+    the other by a random walk of the attitude, which acts on a position by gravity.
+
+    Attributes
+    ----------
+    begin, end : float, s
+    horizontal, vertical : float, m
+        Standard deviations of the error of position at its end.
+    """
+
+    begin: float
+    end: float
+    horizontal: float
+    vertical: float
+
+    def due(self, told: float) -> float:
+        """Time at which the noise that was last told of at another is to be told of again, s."""
+        if told >= self.end:
+            return np.inf
+        return min(max(told, self.begin) + (self.end - self.begin) / PARTS, self.end)
+
+    def covariance(self, told: float, time: float) -> Array:
+        """Covariance of position, velocity and attitude, level axes, by the noise between times.
+
+        Returns
+        -------
+        ndarray, (9, 9)
+        """
+        out = np.zeros((9, 9))
+        dt = min(time, self.end) - max(told, self.begin)
+        if dt <= 0.0:
+            return out
+        length = self.end - self.begin
+        for k, size in enumerate((self.horizontal, self.horizontal, self.vertical)):
+            # Twice integrated, white noise of density q gives the variance q T³ / 3.
+            q = (0.5 if k < 2 else 1.0) * 3.0 * size**2 / length**3
+            own = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]])
+            out[np.ix_([k, 3 + k], [k, 3 + k])] = q * own
+        # And a random walk of the tilt g² q T⁵ / 20.
+        turned = 0.5 * 20.0 * (self.horizontal / STANDARD_GRAVITY) ** 2 / length**5
+        out[range(6, 9), range(6, 9)] = turned * dt
+        return out
+
+
+def wrong_stretches(
+    innovations: Mapping[str, pd.DataFrame], tables: Mapping[str, pd.DataFrame]
+) -> tuple[Wrong, ...]:
+    """Return the stretches over which a solution went wrong, by fixes that were forced on it.
+
+    An adaptive rule that has rejected positions for long takes one in spite of its size. It shows
+    an error of the solution, which its covariance does not have, unless it is the receiver that was
+    wrong: it jumps away or back, stands where the solution moves, or its velocities do not agree
+    with its positions.
+
+    Parameters
+    ----------
+    innovations : mapping of str to DataFrame
+        Of a run, by name of the observation.
+    tables : mapping of str to DataFrame
+        Fixes by name of the receiver.
+    """
+    found: list[Wrong] = []
+    for name, table in innovations.items():
+        aid = name.rpartition(".")[0]
+        labels, fixes = innovation_labels(table), tables.get(aid)
+        if fixes is None or not set(labels) <= set(PLACE):
+            continue
+        time = index_of(table)
+        nu, s, weight = (
+            values_of(table, [f"{part} {label}" for label in labels])
+            for part in ("nu", "s", "weight")
+        )
+        path, velocity = _path(fixes), innovations.get(f"{aid}.velocity")
+        for k, label in enumerate(labels):
+            along = PLACE.index(label)
+            for one in _forced(time, nu[:, k], s[:, k], weight[:, k], along == 2):
+                sign = float(np.sign(nu[int(time.searchsorted(one.end)), k]))
+                if not _confirmed(velocity, along, one, sign) and _moves(
+                    index_of(fixes), path, one
+                ):
+                    found.append(one)
+    return tuple(sorted(found, key=lambda one: one.begin))
+
+
+def longest(stretches: tuple[Wrong, ...]) -> float:
+    """Return how long stretches that follow each other last, s.
+
+    Between two of them agreement is shorter than the second.
+    """
+    begin, end, out = 0.0, -math.inf, 0.0
+    for one in stretches:
+        if one.begin - end > one.end - one.begin:
+            begin = one.begin
+        end = max(end, one.end)
+        out = max(out, end - begin)
+    return out
+
+
+def _path(fixes: pd.DataFrame) -> Array:
+    """Horizontal positions of fixes from the first, (n, 2), m."""
+    places = values_of(fixes, GEODETIC)
+    return place_difference(places, np.broadcast_to(places[0], places.shape))[:, :2]
+
+
+def _moves(time: Array, path: Array, one: Wrong) -> bool:
+    """Whether a receiver moves in a stretch, compared with what the solution is said to be off."""
+    first, end = np.searchsorted(time, [one.begin, one.end], side="right").tolist()
+    way = path[max(first - 1, 0) : end]
+    gone = np.linalg.norm(way - way[0], axis=1).max() if len(way) else 0.0
+    return bool(gone > STANDS * math.hypot(one.horizontal, one.vertical))
+
+
+def _confirmed(velocity: pd.DataFrame | None, along: int, one: Wrong, sign: float) -> bool:
+    """Whether the velocities of a receiver do not show the error of its positions in a stretch.
+
+    `along`: component, north, east or down. `sign`: of the innovation of the position at its end.
+    """
+    column = f"nu {SPEED[along]}"
+    if velocity is None or column not in velocity:
+        return False
+    told = velocity[column].loc[one.begin : one.end].to_numpy(dtype=np.float64)
+    gone = sign * float(told.mean()) * (one.end - one.begin) if len(told) else math.inf
+    return len(told) >= TOGETHER and gone < CONFIRMS * math.hypot(one.horizontal, one.vertical)
+
+
+def _forced(time: Array, nu: Array, s: Array, weight: Array, vertical: bool) -> list[Wrong]:
+    """Stretches before observations of a component that were forced.
+
+    Not where the receiver jumped away, as long as it stays there: for as long as it had agreed, and
+    for a minute at most.
+    """
+    taken = np.flatnonzero(weight > 0.0).tolist()
+    size, step = np.abs(nu), np.diff(time, prepend=time[0])
+    forced = size > REJECTED * np.sqrt(s)
+    away = np.abs(np.diff(nu, prepend=nu[0])) > np.maximum(0.5 * size, SWING * np.square(step))
+    agreed_since, doubted, out = float(time[0]), -math.inf, list[Wrong]()
+    for last, at in pairwise(taken):
+        if not forced[last] or nu[last] * nu[at] < 0.0:
+            agreed = float(time[last]) - agreed_since
+            doubted = float(time[last]) + min(DOUBT, agreed) if away[last + 1] else -math.inf
+        if forced[at]:
+            agreed_since = float(time[at])
+        if at - last <= FEW or not forced[at] or time[at] < doubted:
+            continue
+        soon = slice(at, int(time.searchsorted(time[at] + DOUBT)))
+        if not _jumps_back(time[soon], nu[soon], weight[soon] == 0.0):
+            sizes = (0.0, float(size[at])) if vertical else (float(size[at]), 0.0)
+            out.append(Wrong(float(time[last]), float(time[at]), *sizes))
+    return out
+
+
+def _jumps_back(time: Array, nu: Array, rejected: NDArray[np.bool_]) -> bool:
+    """Whether innovations jump back by about the first: of a receiver that was wrong until then.
+
+    A solution that swings does so by degrees: from one step to the next by an acceleration. After
+    an observation that was taken a step is the correction.
+    """
+    size, free = abs(nu[0]), rejected[:-1]
+    jump = -np.sign(nu[0]) * np.diff(np.diff(nu))
+    far = jump > np.maximum(0.5 * size, SWING * np.square(np.diff(time)[1:]))
+    return bool((far & (jump < 2.0 * size) & free[1:] & free[:-1]).any())

@@ -1,0 +1,232 @@
+"""A solution that good fixes contradict is run again with the noise that explains it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from tests import town_drive as town
+from tests.town_drive import DEG
+
+from strapdown.errors import DivergenceError
+from strapdown.estimation.robust import AdaptiveRule, AdaptiveScale, Igg3
+from strapdown.frames import geodetic_from_ned
+from strapdown.navigation.measurements.gnss import PLACE
+from strapdown.navigation.navigator import Navigator
+from strapdown.navigation.recorder import FullRecorder
+from strapdown.navigation.recovery import PARTS, Wrong, longest, wrong_stretches
+from strapdown.navigation.replay import PipelineRun
+from strapdown.navigation.smoother import RauchTungStriebel
+from strapdown.systems.navigation_run import _recovered
+from strapdown.tables import GEODETIC, VELOCITY, VELOCITY_SD
+
+RULE = AdaptiveRule(Igg3(), AdaptiveScale(lowest=1.0))
+
+
+@dataclass(frozen=True)
+class SimpleChain:
+    """What of a pipeline a recovery changes."""
+
+    navigator: Navigator
+
+
+def fixes(seed=5):
+    """Positions of five centimetres."""
+    table = town.fixes(seed, position_noise=0.05)
+    table[VELOCITY], table[VELOCITY_SD] = 0.0, np.inf
+    return table
+
+
+def pushed(push=0.0, turn=0.0, begin=50.0, end=58.0):
+    """Increments of sensors that are wrong beyond their model for a while: m/s² and deg/s."""
+    time, rows = town.increments()
+    rows, within = rows.copy(), (time > begin) & (time <= end)
+    step = np.diff(time, prepend=time[0] - (time[1] - time[0]))[within]
+    rows[within, 4] += push * step
+    rows[within, 1] += turn * DEG * step
+    return time, rows
+
+
+def navigated(table, samples, smoother=None, asked=None):
+    """The run as its pipeline would have it, repeated where it is contradicted."""
+
+    def drive(chain):
+        _, state = town.begun(town.gnss(rule=RULE))
+        navigator = chain.navigator
+        state = navigator.tell(state, "gnss", table)
+        state, piece = navigator.advance(state, *samples)
+        tape = FullRecorder().begin(navigator)
+        smoothing = None if smoother is None else smoother.begin(navigator)
+        for one in (piece, navigator.finish(state)):
+            tape.take(one)
+            if smoothing is not None:
+                smoothing.take(one)
+        smoothed = None if smoothing is None else tape.record(smoothing=smoothing)
+        return PipelineRun(tape.record(), (), smoothed, smoothing)
+
+    navigator, _ = town.begun(town.gnss(rule=RULE))
+    chain = SimpleChain(replace(navigator, smoother=smoother))
+    first = drive(chain)
+    return first, _recovered(chain, first, {"gnss": table}, drive if asked is None else asked)
+
+
+def off(record):
+    """Distances from the truth at the rows, m, and errors at the marks in bounds."""
+    table = record.trajectory
+    truth = town.motion().trajectory(table.index.to_numpy())[GEODETIC].to_numpy()
+    error = town.place_difference(table[GEODETIC].to_numpy(), truth)
+    at = np.clip(table.index.searchsorted(record.sd.index), 0, len(table) - 1)
+    bound = 1.96 * record.sd[["north", "east", "down"]].to_numpy()
+    return np.linalg.norm(error, axis=1), np.abs(error[at]) / bound
+
+
+@pytest.mark.parametrize("wrong", [{"push": 1.0}, {"turn": 0.5}])
+@pytest.mark.parametrize("smoother", [None, RauchTungStriebel()])
+def test_a_contradicted_solution_returns(wrong, smoother):
+    """Eight seconds of an accelerometer or a gyro that is wrong beyond its model."""
+    first, (_, run, (finding,)) = navigated(fixes(), pushed(**wrong), smoother)
+    assert off(first.record)[0].max() > 100.0
+    assert finding.code == "navigation.run-again-with-noise"
+    assert finding.data["rejected"] > 40.0
+    assert finding.data["left"] < 2.0
+    distance, bounds = off(run.smoothed or run.record)
+    assert distance.max() < 1.0
+    assert bounds.max() < 5.0
+
+
+def test_a_run_that_is_not_contradicted_is_not_repeated():
+    first, (chain, run, findings) = navigated(fixes(), pushed(), asked=pytest.fail)
+    assert run is first
+    assert findings == chain.navigator.wrong == ()
+
+
+def test_a_repeated_run_that_explains_no_more_or_diverges_is_not_used():
+    samples = pushed(push=1.0)
+
+    def diverges(chain):
+        raise DivergenceError("estimation.state-diverged-sample", quantity="state", time=0.0)
+
+    first, (chain, run, findings) = navigated(fixes(), samples, asked=diverges)
+    assert (run, findings, chain.navigator.wrong) == (first, (), ())
+    again, (chain, run, findings) = navigated(fixes(), samples, asked=lambda chain: first)
+    assert (run, findings, chain.navigator.wrong) == (again, (), ())
+
+
+def beside(begin, end, stands):
+    """Fixes that are beside by a constant, or at one place, in a span."""
+    table, rng = fixes(), np.random.default_rng(1)
+    bad = (table.index > begin) & (table.index < end)
+    true = table.loc[bad, GEODETIC].to_numpy()
+    places = true * 0.0 + true[0] if stands else true
+    errors = rng.normal(0.0, 0.05, true.shape) + (0.0 if stands else [20.0, -15.0, 8.0])
+    table.loc[bad, GEODETIC] = [
+        geodetic_from_ned(error, place) for error, place in zip(errors, places, strict=True)
+    ]
+    return table
+
+
+@pytest.mark.parametrize(
+    ("stands", "end"), [(True, 60.0), (True, 80.0), (False, 80.0), (False, 100.0)]
+)
+def test_a_receiver_that_is_wrong_is_not_followed(stands, end):
+    """It stands for 20 or 40 s, or jumps by 26 m for 40 or 60 s and back."""
+    first, (_, run, _) = navigated(beside(40.0, end, stands), pushed())
+    (before, _), (after, bounds) = off(first.record), off(run.record)
+    assert bounds.max() < 4.0
+    time = run.record.trajectory.index.to_numpy()
+    # Beside what the receiver did to the first run it is no farther off, and it returns.
+    assert np.median(after[time > end]) <= np.median(before[time > end])
+    assert np.median(after[time > end + 20.0]) < 1.0
+
+
+@pytest.mark.parametrize("told", [0.1, 3.0, 30.0])
+def test_the_noise_of_a_stretch_has_the_size_of_its_error(told):
+    """However it is cut: white accelerations, and tilts that act by gravity, half of each."""
+    one, dt = Wrong(5.0, 15.0, 20.0, 7.0), 0.01
+    P, time, since = np.zeros((9, 9)), 0.0, 0.0
+    Phi = np.eye(9)
+    Phi[:3, 3:6] = dt * np.eye(3)
+    Phi[3, 7], Phi[4, 6] = 9.80665 * dt, -9.80665 * dt
+    for k in range(1, 2001):
+        time = k * dt
+        P = Phi @ P @ Phi.T
+        if time >= since + told or k in (500, 1500):
+            P += one.covariance(since, time)
+            since = time
+        if k == 1500:
+            sd = np.sqrt(np.diagonal(P))
+    fine = told < 1.0
+    np.testing.assert_allclose(sd[:3], [20.0, 20.0, 7.0], rtol=0.02 if fine else 0.8)
+    assert not one.covariance(0.0, 5.0).any()
+    assert not one.covariance(15.0, 20.0).any()
+
+
+def test_it_is_told_of_in_parts_to_its_end():
+    one, at, times = Wrong(5.0, 15.0, 1.0, 1.0), 0.0, []
+    while np.isfinite(at := one.due(at)):
+        times.append(at)
+    assert times[0] == pytest.approx(5.0 + 10.0 / PARTS)
+    assert times[-1] == 15.0
+    assert len(times) in (PARTS, PARTS + 1)
+
+
+def test_any_cut_gives_the_same_bits():
+    found = []
+    for sizes in ([10**6], [7, 50, 3]):
+        navigator, state = town.begun(town.gnss(rule=RULE))
+        navigator = replace(
+            navigator, wrong=(Wrong(20.2, 31.0, 5.0, 1.0), Wrong(25.0, 40.0, 1.0, 3.0))
+        )
+        time, rows = town.increments()
+        state, at, k = navigator.tell(state, "gnss", fixes()), 0, 0
+        while at < 5000:
+            end = min(at + sizes[k % len(sizes)], 5000)
+            state, _ = navigator.advance(state, time[at:end], rows[at:end])
+            at, k = end, k + 1
+        found.append(state.engine.filter.covariance)
+    np.testing.assert_array_equal(*found)
+
+
+def test_without_positions_of_a_receiver_nothing_is_found():
+    first, _ = navigated(fixes(), pushed(push=1.0))
+    assert wrong_stretches(first.record.innovations, {"gnss": fixes()})
+    assert wrong_stretches(first.record.innovations, {}) == ()
+
+
+@pytest.mark.parametrize(("speed", "count"), [(0.0, 0), (1.0, 1)])
+def test_velocities_that_agree_with_the_solution_show_a_receiver_that_is_wrong(speed, count):
+    """Positions that leave a solution by 1 m/s, with velocities that do so, too, or do not."""
+    table = fixes()
+    time = table.index.to_numpy()
+    bad = (time > 50.0) & (time <= 58.0)
+    nu = np.where(bad, time - 50.0, 0.0)
+    weight = np.where(bad & (time < 58.0), 0.0, 1.0)
+    told = pd.DataFrame(index=table.index)
+    for label, own in (("north, m", nu), ("east, m", 0.0 * nu), ("down, m", 0.0 * nu)):
+        told[f"nu {label}"], told[f"s {label}"] = own, 0.01
+        told[f"weight {label}"] = weight if own is nu else 1.0
+    columns = [f"{part} {label}" for part in ("nu", "s", "weight") for label in PLACE]
+    velocity = pd.DataFrame({"nu VN, m/s": np.where(bad, speed, 0.0)}, index=table.index)
+    innovations = {"gnss.position": told[columns], "gnss.velocity": velocity}
+    found = wrong_stretches({"gnss.position": told[columns]}, {"gnss": table})
+    assert [one.horizontal for one in found] == [8.0]
+    with_velocity = wrong_stretches(innovations, {"gnss": table})
+    assert len(with_velocity) == count
+
+
+def test_stretches_that_follow_each_other_are_one():
+    parts = [Wrong(a, b, 1.0, 0.0) for a, b in ((0, 5), (7, 12), (12, 20), (40, 50), (65, 70))]
+    assert longest(tuple(parts)) == 20.0
+    assert longest(tuple(parts[3:])) == 10.0
+    assert longest(()) == 0.0
+
+
+def test_a_short_contradiction_is_left_to_the_rule():
+    """Half a minute of fixes that the solution contradicts: a receiver may be wrong so long."""
+    table = fixes()
+    first, (_, run, findings) = navigated(
+        table[table.index < 85.0], pushed(push=1.0), asked=pytest.fail
+    )
+    assert wrong_stretches(first.record.innovations, {"gnss": table})
+    assert run is first
+    assert findings == ()
