@@ -33,6 +33,7 @@ SLOW = {
     "compare",
     "campaign",
     "align",
+    "attitude",
     "allan",
     "answer",
     "car",

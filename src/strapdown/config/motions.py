@@ -236,6 +236,44 @@ class WaypointsSpec(Spec):
         return self
 
 
+class PulseSpec(Spec):
+    """One pulse of rate about an axis, or several at a period."""
+
+    start_s: NotNegative
+    duration_s: Positive
+    #: Between the edges.
+    rate_deg_per_s: Number | None = None
+    #: Instead of the rate: of the whole pulse.
+    turn_deg: Number | None = None
+    #: Of a raised cosine at either end: zero for a rectangle, half of the duration for a haversine.
+    edge_s: NotNegative = 0.0
+    times: StrictInt = Field(default=1, ge=1, le=100_000)
+    every_s: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> PulseSpec:
+        if (self.rate_deg_per_s is None) == (self.turn_deg is None):
+            raise refuse("rate_deg_per_s, turn_deg", "config.rate-or-turn")
+        if (self.times > 1) != (self.every_s is not None):
+            raise refuse("times, every_s", "config.times-and-period")
+        return self
+
+
+class PulsesSpec(Spec):
+    """Pulses of rate about the body's axes, overlapping or not."""
+
+    kind: Literal["pulses"]
+    duration_s: Positive
+    roll_deg: Number = 0.0
+    pitch_deg: Number = 0.0
+    heading_deg: Number = 0.0
+    x: tuple[PulseSpec, ...] = ()
+    y: tuple[PulseSpec, ...] = ()
+    z: tuple[PulseSpec, ...] = ()
+    #: From the point about which the body turns to the sensor.
+    arm_m: Triple = (0.0, 0.0, 0.0)
+
+
 MotionSpec = Annotated[
     StationarySpec
     | RockingStandSpec
@@ -247,6 +285,9 @@ MotionSpec = Annotated[
     | WaypointsSpec,
     Field(discriminator="kind"),
 ]
+
+#: Motion of a scenario.
+ScenarioMotion = Annotated[PulsesSpec | MotionSpec, Field(discriminator="kind")]
 
 #: Values of `kind` of a motion.
 KINDS = tuple(

@@ -3,61 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, FiniteFloat, StrictInt, model_validator
+from pydantic import BeforeValidator, Field, FiniteFloat, StrictInt
 
-from strapdown.config.motions import MotionSpec
 from strapdown.config.reading import FileSpec
-from strapdown.config.spec import NotNegative, Number, Positive, Spec, Triple, refuse
+from strapdown.config.spec import Later, Positive, Spec, Triple
 from strapdown.config.toml_file import read_toml
 
 __all__ = [
     "CrashSimulationSpec",
     "LogSpec",
-    "PulsesSpec",
     "ScenarioFile",
     "ScenarioSpec",
     "SimulateSpec",
 ]
-
-
-class PulseSpec(Spec):
-    """One pulse of rate about an axis, or several at a period."""
-
-    start_s: NotNegative
-    duration_s: Positive
-    #: Between the edges.
-    rate_deg_per_s: Number | None = None
-    #: Instead of the rate: of the whole pulse.
-    turn_deg: Number | None = None
-    #: Of a raised cosine at either end: zero for a rectangle, half of the duration for a haversine.
-    edge_s: NotNegative = 0.0
-    times: StrictInt = Field(default=1, ge=1, le=100_000)
-    every_s: Positive | None = None
-
-    @model_validator(mode="after")
-    def _one(self) -> PulseSpec:
-        if (self.rate_deg_per_s is None) == (self.turn_deg is None):
-            raise refuse("rate_deg_per_s, turn_deg", "config.rate-or-turn")
-        if (self.times > 1) != (self.every_s is not None):
-            raise refuse("times, every_s", "config.times-and-period")
-        return self
-
-
-class PulsesSpec(Spec):
-    """Pulses of rate about the body's axes, overlapping or not."""
-
-    kind: Literal["pulses"]
-    duration_s: Positive
-    roll_deg: Number = 0.0
-    pitch_deg: Number = 0.0
-    heading_deg: Number = 0.0
-    x: tuple[PulseSpec, ...] = ()
-    y: tuple[PulseSpec, ...] = ()
-    z: tuple[PulseSpec, ...] = ()
-    #: From the point about which the body turns to the sensor.
-    arm_m: Triple = (0.0, 0.0, 0.0)
 
 
 class GyroErrorsSpec(Spec):
@@ -88,7 +48,7 @@ class ScenarioFile(FileSpec):
     sensor: str | None = None
     references: tuple[str, ...] = ()
     #: Of pulses; within a campaign on the Earth as well, with its turning.
-    motion: Annotated[PulsesSpec | MotionSpec, Field(discriminator="kind")]
+    motion: Annotated[Any, BeforeValidator(Later("strapdown.config.motions", "ScenarioMotion"))]
     gyro: GyroErrorsSpec = Field(default_factory=GyroErrorsSpec)
     accel: AccelErrorsSpec = Field(default_factory=AccelErrorsSpec)
 

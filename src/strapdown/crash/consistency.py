@@ -837,10 +837,12 @@ def compare_pair(
     kept: Flags,
     level: float,
     rigid: Structure,
+    explained: bool = True,
 ) -> UnitPair:
     """Compare two units over the `kept` intervals of their increments `a` and `b`.
 
-    `level` as `compare_units`; `rigid`: the structural process of the vehicle, without size.
+    `level` as `compare_units`; `rigid`: the structural process of the vehicle, without size;
+    `explained`: whether a mounting is looked for that would explain a disagreement.
     """
     edges = a.edges
     a, b = a.of_pieces(kept), b.of_pieces(kept)
@@ -868,17 +870,17 @@ def compare_pair(
     # An axis that is not measured has a variance of zero, or its rounding.
     variance = np.maximum(np.diag(covariance), 0.0)
     force[1, kept] = np.sqrt(variance).reshape(-1, 3) / lengths + told
-    findings: list[Finding] = []
+    agree, findings = probability >= level, list[Finding]()
     whole = not (first.assumed_axes or second.assumed_axes) and bool(kept.any())
+    whole = whole and (agree or explained)
     body = body_turning((a, b)) if whole else None
     if whole:
         # Swapped axes make more of a difference than any structure, which would hide them.
         turned, lever = mounting_rotation(a, b), check_lever_arm(a, b, body)
-        axes = match_axes(*((a, b) if probability >= level else stiff), turned.matrix)
+        axes = match_axes(*((a, b) if agree else stiff), turned.matrix)
     else:
         # The checks of relative mounting need three measured axes and a gyro on both units.
         axes, turned, lever = AxisMatch.untold(), MountingRotation.untold(), LeverArmCheck.untold()
-    agree = probability >= level
     if not kept.any():
         code = "crash.no-piece-record-neither-end"
         findings.append(Finding(code, file=first.name, quantity="comparison", name=second.name))

@@ -91,7 +91,10 @@ def undetectable(
         for k, unit in enumerate(units):
             tried = wrong(increments[k])
             pairs = (
-                compare_pair(unit, other, tried, increments[j], ~(cut[k] | cut[j]), level, rigid)
+                compare_pair(
+                    *(unit, other, tried, increments[j], ~(cut[k] | cut[j]), level, rigid),
+                    explained=False,
+                )
                 for j, other in enumerate(units)
                 if j != k
             )

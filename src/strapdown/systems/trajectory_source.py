@@ -13,9 +13,9 @@ import pandas as pd
 from strapdown import rotation
 from strapdown.config import motions
 from strapdown.config.alignment import SimulationTable
-from strapdown.config.motions import TrajectorySpec
+from strapdown.config.motions import PulsesSpec, TrajectorySpec
 from strapdown.config.navigation import NavigationSimulationTable, ReceiverTable
-from strapdown.config.sources import PulsesSpec, ScenarioSpec
+from strapdown.config.sources import ScenarioSpec
 from strapdown.config.spec import AngleWaveSpec
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid

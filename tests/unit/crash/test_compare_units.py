@@ -20,6 +20,8 @@ from strapdown.crash.combine_units import (
     least_variance,
 )
 from strapdown.crash.consistency import (
+    common_edges,
+    compare_pair,
     compare_units,
     difference_covariance,
     joint_covariance,
@@ -28,6 +30,7 @@ from strapdown.crash.consistency import (
 )
 from strapdown.crash.measuring_point import SampleEffects, at_point
 from strapdown.crash.preparation import prepare_together
+from strapdown.crash.structure import unlearnt
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.pre_crash import Levelling, PreparedUnit
@@ -213,6 +216,23 @@ def test_a_unit_turned_as_a_whole_and_a_gyro_turned_alone():
     alone = compare_units([unit("A", A, 1), unit("B", B, 2, gyro_axes=gyro)])
     assert np.array_equal(alone.pairs[0].axes.gyro, gyro)
     assert any("the axes of its gyro differ" in str(f) for f in alone.findings)
+
+
+@pytest.mark.parametrize(("index", "agree"), [(5, False), (47, False), (None, True)])
+def test_without_an_explanation_the_verdict_is_the_same(index, agree):
+    axes = np.eye(3) if index is None else signed_permutations()[index]
+    pair = unit("A", A, 1), unit("B", B, 2, accel_axes=axes)
+    edges = common_edges(pair, None, 20)
+    a, b = (velocity_increments(u, edges) for u in pair)
+    kept = np.ones(len(edges) - 1, dtype=bool)
+    whole, short = (
+        compare_pair(*pair, a, b, kept, 1e-3, unlearnt(pair), explained=e) for e in (True, False)
+    )
+    assert whole.agree == short.agree == agree
+    assert whole.probability == short.probability
+    # Where the points agree, a mounting may still be said to be wrong.
+    assert np.array_equal(short.turned.sd_deg, whole.turned.sd_deg) == agree
+    assert (short.findings == whole.findings) == agree
 
 
 @pytest.mark.slow
