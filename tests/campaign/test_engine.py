@@ -9,7 +9,9 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
+import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +20,7 @@ import pandas as pd
 import pytest
 
 from strapdown.campaign import dataset
+from strapdown.campaign.case_process import CaseProcess
 from strapdown.campaign.engine import Workers
 from strapdown.campaign.run import (
     case_of,
@@ -203,14 +206,61 @@ def test_a_scheduler_without_workers_and_none_at_all(
     assert code == "campaign.no-workers"
 
 
-def test_a_dashboard_that_nothing_draws_is_refused(
-    cheap: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("missing", "code"), [("distributed", "campaign.no-dask"), ("bokeh", "campaign.no-bokeh")]
+)
+def test_what_is_not_installed_is_said_before_a_case_runs(
+    missing: str, code: str, cheap: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = written(cheap, DRAWN.format(draws=2))
-    monkeypatch.setattr("strapdown.campaign.engine.find_spec", lambda name: None)
+    monkeypatch.setattr(
+        "strapdown.campaign.engine.find_spec", lambda name: None if name == missing else object()
+    )
+    monkeypatch.setattr("strapdown.campaign.engine.CaseProcess", None)
     with pytest.raises(ConfigError) as caught:
         run_campaign(file, workers=Workers(1, dashboard=True))
-    assert caught.value.finding.code == "campaign.no-bokeh"
+    assert caught.value.finding.code == code
+
+
+def test_the_dashboard_is_where_it_is_said_to_be(
+    cheap: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without bokeh dask serves a page at its address that says so."""
+    monkeypatch.setattr("strapdown.campaign.engine.find_spec", lambda name: object())
+    pages: list[tuple[str, bytes]] = []
+
+    def look(address: str) -> None:
+        with urllib.request.urlopen(address, timeout=60.0) as answer:
+            pages.append((address, answer.read()))
+
+    file = written(cheap, DRAWN.format(draws=2))
+    run_campaign(file, workers=Workers(1, dashboard=True), shown=look)
+    ((address, page),) = pages
+    assert address.startswith("http://127.0.0.1:")
+    assert b"bokeh" in page.lower()
+
+
+def test_processes_begin_before_their_workers_and_end_with_them(
+    cheap: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[CaseProcess] = []
+    begin = CaseProcess.begin
+
+    def noted(one: CaseProcess) -> threading.Thread:
+        begun.append(one)
+        return begin(one)
+
+    monkeypatch.setattr(CaseProcess, "begin", noted)
+    file = written(cheap, DRAWN.format(draws=3))
+    assert set(run_campaign(file, workers=2).cases["status"]) == {"done"}
+    # No more than there are cases, and those that began run them: no further one is started.
+    assert len(begun) == 2
+    run_campaign(written(cheap, DRAWN.format(draws=1), "one.toml"), workers=2)
+    assert len(begun) == 3
+    for one in begun:
+        assert one._process is None
+        begin(one).join()
+        assert one._process is None
 
 
 @pytest.mark.slow

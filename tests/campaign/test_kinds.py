@@ -10,9 +10,15 @@ import pytest
 
 from strapdown.campaign.case_process import run_case
 from strapdown.campaign.design import Campaign
+from strapdown.campaign.kinds import KINDS, at_path
 from strapdown.campaign.run import case_of, differing, run_campaign, save_case
 from strapdown.campaign.specification import CampaignSpec
+from strapdown.config.outage import OutageSpec
+from strapdown.config.spec import specify
+from strapdown.navigation import outage
+from strapdown.report.outage import outage_json
 from strapdown.report.verify import verify
+from strapdown.systems.outage_run import run_outage
 
 FLEET = """
 [base]
@@ -188,3 +194,25 @@ def test_a_case_that_is_refused_says_why(tmp_path: Path) -> None:
     assert recorded is not None
     assert (row["status"], row["code"]) == ("refused", recorded["code"])
     assert [one.code for one in row["errors"]] == ["config.unknown-key"]
+
+
+def test_a_case_computes_the_budget_that_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    table = {"sensor": "mpu-6050", "outage_s": 2.0, "start": {"aided_s": 0.0}}
+    scaled, asked = outage.scaled, []
+    monkeypatch.setattr(outage, "scaled", lambda *given: asked.append(1) or scaled(*given))
+    kind = KINDS["outage"]
+    run = kind.run(table, "case")
+    data = kind.data(run)
+    end = at_path(data, ("at_the_end", "horizontal_95_m"))
+    assert kind.curves(run)["horizontal_95_m"].iloc[-1] == pytest.approx(end)
+    assert not asked
+    shares = [
+        at_path(data, ("budget", "sources", k, "share", "horizontal"))
+        for k in range(len(run.forecast.shares))
+    ]
+    # Each source larger and smaller, once however often it is read.
+    assert len(asked) == 2 * len(shares)
+    assert sum(shares) == pytest.approx(1.0)
+    whole = outage_json(run_outage(specify(OutageSpec, **table)))
+    assert whole == outage_json(run)
+    assert [one["share"]["horizontal"] for one in whole["budget"]["sources"]] == shares

@@ -210,6 +210,19 @@ class CaseProcess:
         self._closed = False
         self._busy = threading.Lock()
 
+    def begin(self) -> threading.Thread:
+        """Start the process meanwhile: it loads what it runs while its keeper does the same."""
+
+        def start() -> None:
+            # Where it does not start, its first cases say so.
+            with self._busy, contextlib.suppress(ConfigError):
+                if not self._closed:
+                    self._started()
+
+        thread = threading.Thread(target=start, daemon=True)
+        thread.start()
+        return thread
+
     def run(self, numbers: Sequence[int]) -> Iterator[Row]:
         """Yield the rows of cases, whatever happens to them."""
         left = list(numbers)

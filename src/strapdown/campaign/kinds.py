@@ -66,7 +66,10 @@ class Kind:
 
 
 def at_path(node: Any, path: Iterable[str | int]) -> Any:
-    """Return the value at a place, or None: numbers are places in a list, from 0."""
+    """Return the value at a place, or None: numbers are places in a list, from 0.
+
+    A function on the way is computed: what nobody asks for costs nothing.
+    """
     for part in path:
         if isinstance(node, dict):
             node = node.get(part, node.get(str(part)))
@@ -74,6 +77,7 @@ def at_path(node: Any, path: Iterable[str | int]) -> Any:
             node = node[part]
         else:
             return None
+        node = node() if callable(node) else node
     return node
 
 
@@ -259,13 +263,13 @@ def _outage(table: Table, name: str) -> Any:
     from strapdown.config.outage import OutageSpec
     from strapdown.systems.outage_run import run_outage
 
-    return run_outage(specify(OutageSpec, **table), None, None)
+    return run_outage(specify(OutageSpec, **table), budget=False)
 
 
 def _outage_data(run: Any) -> Table:
-    from strapdown.report.outage import outage_json
+    from strapdown.report.outage import outage_parts
 
-    return outage_json(run)
+    return outage_parts(run)
 
 
 def _outage_curves(run: Any) -> pd.DataFrame:

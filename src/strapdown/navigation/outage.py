@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
@@ -80,6 +81,10 @@ class Share:
     alone: dict[str, Array]
 
 
+#: Shares of the sources, and by quantity what is due to the remaining measurements.
+Budget = tuple[tuple[Share, ...], dict[str, Array]]
+
+
 @dataclass(frozen=True, eq=False)
 class Forecast:
     """Predicted drift.
@@ -96,10 +101,9 @@ class Forecast:
         Displacement m, velocity m/s, rotation rad, north-east-down.
     course : ndarray, (n,), rad
         Course; the heading while stationary.
-    shares : tuple of Share
-        The largest at the end first.
-    aids : mapping of str to ndarray, (n,)
-        By quantity: variance due to the noise of the remaining measurements; empty without.
+    budget : callable
+        Computes `shares` and `aids`, which takes two further runs for each source: they are
+        computed when they are first read.
     """
 
     begin: float
@@ -107,8 +111,21 @@ class Forecast:
     trajectory: pd.DataFrame
     covariance: Array
     course: Array
-    shares: tuple[Share, ...]
-    aids: dict[str, Array]
+    budget: Callable[[], Budget] = field(repr=False)
+
+    @property
+    def shares(self) -> tuple[Share, ...]:
+        """Contributions of the sources, the largest at the end first."""
+        return self._computed[0]
+
+    @property
+    def aids(self) -> dict[str, Array]:
+        """By quantity: variance by the noise of the remaining measurements, (n,); empty without."""
+        return self._computed[1]
+
+    @cached_property
+    def _computed(self) -> Budget:
+        return self.budget()
 
     def variance(self, quantity: str) -> Array:
         """Variance of a quantity, (n,); for the plane, the sum of both components."""
@@ -159,7 +176,7 @@ def forecast(
     aided: bool,
     progress: Progress = silent,
 ) -> Forecast:
-    """Run the filter over an outage, and again with each source larger and smaller.
+    """Run the filter over an outage, and for its budget with each source larger and smaller.
 
     The variance at any instant is homogeneous of the second degree in the sizes of all sources,
     including the noise of the remaining measurements: half of its derivatives by the logarithms of
@@ -180,28 +197,32 @@ def forecast(
     """
     navigator = _marked(navigator, outage)
     time, P, trajectory = covariance_over(navigator, state, go, outage)
-    begin = state.time
-    course = courses(trajectory, time + begin)
-    part = AIDED_PART if aided else LINEAR_PART
+    at = time + state.time
+    course = courses(trajectory, at)
     whole = variances(P, course)
-    known = physical(navigator, state)
-    shares = []
-    sources = sources_of(navigator.filter.model)
-    for number, source in enumerate(sources):
-        progress(f"budget: {source.name.replace('_', ' ')}", number / len(sources))
-        more, less = (
-            _as_it_would_be(*scaled(navigator, state, source, f), go, time + begin, course)
-            for f in (1.0 + part, 1.0 - part)
-        )
-        own = {q: (more[q] - less[q]) / (4.0 * part) for q in whole}
-        curved = {q: (more[q] + less[q] - 2.0 * whole[q]) / (2.0 * part**2) for q in whole}
-        none = np.full(len(time), math.nan)
-        alone = {q: none if aided else np.sqrt(np.maximum(v, 0.0)) for q, v in curved.items()}
-        shares.append(Share(source, source.sd(known), own, alone))
-    shares.sort(key=lambda one: -one.variance["horizontal"][-1])
-    left = {q: v - np.sum([one.variance[q] for one in shares], axis=0) for q, v in whole.items()}
-    trajectory.index = trajectory.index - begin
-    return Forecast(begin, time, trajectory, P, course, tuple(shares), left if aided else {})
+
+    def budget() -> Budget:
+        part = AIDED_PART if aided else LINEAR_PART
+        known = physical(navigator, state)
+        shares = []
+        sources = sources_of(navigator.filter.model)
+        for number, source in enumerate(sources):
+            progress(f"budget: {source.name.replace('_', ' ')}", number / len(sources))
+            more, less = (
+                _as_it_would_be(*scaled(navigator, state, source, f), go, at, course)
+                for f in (1.0 + part, 1.0 - part)
+            )
+            own = {q: (more[q] - less[q]) / (4.0 * part) for q in whole}
+            curved = {q: (more[q] + less[q] - 2.0 * whole[q]) / (2.0 * part**2) for q in whole}
+            none = np.full(len(time), math.nan)
+            alone = {q: none if aided else np.sqrt(np.maximum(v, 0.0)) for q, v in curved.items()}
+            shares.append(Share(source, source.sd(known), own, alone))
+        shares.sort(key=lambda one: -one.variance["horizontal"][-1])
+        sums = {q: np.sum([one.variance[q] for one in shares], axis=0) for q in whole}
+        return tuple(shares), {q: v - sums[q] for q, v in whole.items()} if aided else {}
+
+    trajectory.index = trajectory.index - state.time
+    return Forecast(state.time, time, trajectory, P, course, budget)
 
 
 def covariance_over(

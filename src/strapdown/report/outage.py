@@ -15,7 +15,7 @@ from strapdown.config.spec import specify
 from strapdown.config.toml_file import read_toml
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
-from strapdown.navigation.outage import QUANTITIES
+from strapdown.navigation.outage import QUANTITIES, Forecast
 from strapdown.report.outage_document import (
     drifts_of,
     end_bound,
@@ -143,14 +143,19 @@ def outage_json(result: OutageRun) -> dict[str, Any]:
     dict
         Lengths in m, times in s, angles in deg; sizes of error sources in SI.
     """
+    parts = outage_parts(result)
+    return finite({key: part() if callable(part) else part for key, part in parts.items()})
+
+
+def outage_parts(result: OutageRun) -> dict[str, Any]:
+    """As `outage_json`, whose parts that need the budget are functions."""
     predicted, variances = result.forecast, result.cone[2]
     whole = {q: float(v[-1]) for q, v in variances.items()}
-    budget = predicted.variance("horizontal")[-1]
-    data = {
+    parts = {
         "name": result.name,
         "what": result.what,
         "answer": spaced(headline(result)),
-        "remedy": spaced(remedy(result)),
+        "remedy": lambda: spaced(remedy(result)),
         "outage_s": result.spec.outage_s,
         "start": spaced(start_words(result)),
         "begin_s": predicted.begin,
@@ -159,26 +164,7 @@ def outage_json(result: OutageRun) -> dict[str, Any]:
             "horizontal_95_m": end_bound(result),
             **{SHOWN[q][0]: SHOWN[q][1] * math.sqrt(max(v, 0.0)) for q, v in whole.items()},
         },
-        "budget": {
-            "outage_from_s": predicted.begin,
-            "horizontal_sd_m": float(math.sqrt(budget)),
-            "sources": [
-                {
-                    "source": one.source.name,
-                    "sd_at_start": one.sd.tolist(),
-                    "unit": one.source.unit,
-                    "share": {
-                        q: one.variance[q][-1] / _positive(predicted.variance(q)[-1])
-                        for q in QUANTITIES
-                    },
-                    "alone_m": float(one.alone["horizontal"][-1]),
-                }
-                for one in predicted.shares
-            ],
-            "measurements": {
-                q: v[-1] / _positive(predicted.variance(q)[-1]) for q, v in predicted.aids.items()
-            },
-        },
+        "budget": lambda: _budget(predicted),
         "outages": {
             "tried": len(result.drifts),
             "equal_length": len(result.equal),
@@ -207,7 +193,30 @@ def outage_json(result: OutageRun) -> dict[str, Any]:
         ],
         "findings": [f.plain("file") for f in result.findings],
     }
-    return finite(data)
+    return finite(parts)
+
+
+def _budget(predicted: Forecast) -> dict[str, Any]:
+    return {
+        "outage_from_s": predicted.begin,
+        "horizontal_sd_m": float(math.sqrt(predicted.variance("horizontal")[-1])),
+        "sources": [
+            {
+                "source": one.source.name,
+                "sd_at_start": one.sd.tolist(),
+                "unit": one.source.unit,
+                "share": {
+                    q: one.variance[q][-1] / _positive(predicted.variance(q)[-1])
+                    for q in QUANTITIES
+                },
+                "alone_m": float(one.alone["horizontal"][-1]),
+            }
+            for one in predicted.shares
+        ],
+        "measurements": {
+            q: v[-1] / _positive(predicted.variance(q)[-1]) for q, v in predicted.aids.items()
+        },
+    }
 
 
 def write_outage_tables(result: OutageRun, folder: Path) -> None:

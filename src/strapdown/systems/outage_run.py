@@ -186,6 +186,8 @@ def run_outage(
     navigation: NavigationSpec | None = None,
     file: Path | None = None,
     progress: Progress = silent,
+    *,
+    budget: bool = True,
 ) -> OutageRun:
     """Predict the drift in an outage; for a navigation run, also measure it.
 
@@ -199,6 +201,9 @@ def run_outage(
         Configuration file of the run, listed as an input.
     progress : callable, optional
         Called with a stage and the share that is done.
+    budget : bool
+        Whether the shares of the sources are computed at once, which takes two thirds of the time;
+        else when they are first read.
 
     Raises
     ------
@@ -212,13 +217,14 @@ def run_outage(
             raise ConfigError("outage.nothing-says-sensor", quantity="sensor")
         sensors = sensor_of(spec.sensor)
         sensor = load_sensor(spec.sensor)
+        predicted = _alone(forecast_of_sensor(spec, sensors, progress), now=budget)
         return OutageRun(
             spec,
             None,
             sensor.name,
             sensor.title,
             sensors,
-            forecast_of_sensor(spec, sensors, progress),
+            predicted,
             (),
             tuple(spec.aiding),
             sensor_file(spec.sensor),
@@ -229,6 +235,7 @@ def run_outage(
     navigation = navigation.with_path("map", None)
     source = read_navigation_source(navigation)
     predicted, drifts = outage_of_run(spec, navigation, source, progress)
+    predicted = _alone(predicted, now=budget)
     return OutageRun(
         spec,
         navigation,
@@ -241,6 +248,14 @@ def run_outage(
         (*configuration_file(file), *source.inputs),
         tuple(source.findings),
     )
+
+
+def _alone(found: Forecast, *, now: bool) -> Forecast:
+    """With a budget on one thread of the linear algebra, whenever it is computed."""
+    found = replace(found, budget=one_thread()(found.budget))
+    if now:
+        _ = found.shares
+    return found
 
 
 # Drift of a navigation run during outages of its receivers, predicted and measured.
