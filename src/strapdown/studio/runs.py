@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -26,9 +26,13 @@ from strapdown import rotation
 from strapdown.bundle import MANIFEST, SIGNATURE_FILE, UNSEALED, read_manifest, sha256
 from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
 from strapdown.studio.folder import Folder
+from strapdown.studio.kinds import KINDS
 from strapdown.studio.look import kept_stream
 from strapdown.studio.pyramid import LIST
 from strapdown.tables.checks import index_of
+
+if TYPE_CHECKING:
+    from strapdown.report.compare_folders import SealedRun
 
 __all__ = ["compare", "export", "file_of_run", "run", "run_stream", "summary", "track"]
 
@@ -129,13 +133,15 @@ def run(folder: Path, name: str) -> dict[str, Any]:
     with suppress(StrapdownError):
         listed = json.loads((Path(run_stream(folder, name)) / LIST).read_text(encoding="utf-8"))
         span = {key: listed[key] for key in span}
-    has = {str(one["name"]) for one in manifest["outputs"]}
+    from strapdown.report.compare_folders import open_run
+
+    has, sealed = {str(one["name"]) for one in manifest["outputs"]}, open_run(place, place.name)
     return {
         **summary(folder, name),
         **span,
         "answer": _word(answer, "answer") or _word(answer, "headline"),
-        "numbers": _numbers(place),
-        "options": manifest["configuration"],
+        "numbers": _numbers(sealed),
+        "options": options_table(sealed),
         "inputs": [
             {key: one.get(key) for key in ("role", "name", "kept", "sha256", "bytes")}
             for one in manifest["inputs"]
@@ -170,27 +176,64 @@ def _answer(place: Path, manifest: Mapping[str, Any], most: int | None = None) -
     return {}
 
 
-def _numbers(place: Path) -> list[dict[str, Any]]:
+def _numbers(sealed: SealedRun) -> list[dict[str, Any]]:
     """Return the numbers of a result with their 95 % bounds: those that `compare` compares."""
-    from strapdown.report.compare_folders import open_run
+    from strapdown.report.compare import NumberRow, units_of
+    from strapdown.report.compare_document import shown_row
     from strapdown.report.compare_numbers import values_of
 
-    found = []
-    for part in open_run(place, place.name).parts:
+    found, system = [], units_of(sealed)
+    for part in sealed.parts:
         for one in values_of(part):
+            said = shown_row(NumberRow(one.key, (one,), (None,), (None,)), system)
             found.append(
                 {
                     "group": one.group,
                     "label": one.label,
-                    "value": _finite(one.value),
-                    "unit": one.unit,
+                    "value": said["values"][0],
+                    "bound": said["bounds"][0],
+                    "unit": said["unit"],
                     # A bound of a latitude or a longitude is along the ground.
-                    "bound_unit": "m" if one.kind in ("lat", "lon") else one.unit,
-                    "below": _finite(one.below),
-                    "above": _finite(one.above),
+                    "bound_unit": said["bound_unit"],
                 }
             )
     return found[:MOST]
+
+
+def options_table(sealed: SealedRun) -> list[dict[str, Any]]:
+    """Return the options of a result: key, name, value, unit, default, and what it is.
+
+    ``usual``: whether the value is the default. A default is None where the form of the command
+    states none.
+    """
+    from strapdown.report.compare_folders import options_of
+    from strapdown.studio.forms import form_of, unit_of
+
+    kind = KINDS.get(sealed.command)
+    fields = [] if kind is None else [f for one in form_of(kind.form) for f in one["fields"]]
+    known = {field["path"]: field for field in fields}
+    named = [(re.compile(_any_name(path)), f) for path, f in known.items() if "*" in path]
+    rows = []
+    for key, value in list(options_of(sealed).items())[:MOST]:
+        path = re.sub(r"\[[^\]]*\]", "[]", key)
+        field = known.get(path) or next((f for form, f in named if form.fullmatch(path)), {})
+        plain = value if isinstance(value, bool | int | float | str | list) else str(value)
+        rows.append(
+            {
+                "key": key[:200],
+                "label": field.get("label"),
+                "value": _finite(plain),
+                "unit": unit_of(key.rpartition(".")[2]),
+                "default": field.get("default"),
+                "usual": bool(field) and plain == field["default"],
+                "help": field.get("help") or "",
+            }
+        )
+    return rows
+
+
+def _any_name(path: str) -> str:
+    return re.escape(path).replace(r"\*", r"[^.]+")
 
 
 def _finite(value: Any) -> Any:
@@ -438,6 +481,7 @@ def compare(folder: Path, runs: Sequence[str]) -> dict[str, Any]:
     """Compare results: the JSON of ``strapdown compare``, and the address of its page."""
     from strapdown.api.compare import compare_runs
     from strapdown.report.compare import comparison_json
+    from strapdown.report.compare_document import shown_row
 
     place = Folder(folder)
     digests = [sha256(place.file(name) / MANIFEST) for name in runs]
@@ -450,8 +494,13 @@ def compare(folder: Path, runs: Sequence[str]) -> dict[str, Any]:
         for old in sorted(kept.parent.iterdir(), key=lambda p: p.stat().st_mtime)[: -10 * KEPT]:
             shutil.rmtree(old, ignore_errors=True)
     command = shlex.join(("strapdown", "compare", *runs))
+    told = comparison_json(found)
+    for row, one in zip(told["numbers"], found.numbers, strict=True):
+        row |= {"shown": shown_row(one, found.units), "detail": one.any.detail}
+    other = {row.key for row in found.options}
     return {
-        **comparison_json(found),
+        **told,
+        "same_options": [one for one in options_table(found.runs[0]) if one["key"] not in other],
         "page": f"comparisons/{key}/report.html",
         "command_line": command,
     }
