@@ -65,7 +65,14 @@ from strapdown.units import SHOWN_UNITS
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = ["COMPARE", "NumberRow", "RunComparison", "compare_results", "comparison_json", "units_of"]
+__all__ = [
+    "COMPARE",
+    "NumberRow",
+    "RunComparison",
+    "compare_results",
+    "comparison_json",
+    "units_of",
+]
 
 #: Instants that differ by less are the same, s.
 SAME_INSTANT = 1e-6

@@ -406,6 +406,11 @@ def _apart(row: NumberRow, k: int, factor: float) -> str:
         if other.at is not None and first.at is not None and other.at != first.at:
             return "other instant"
         return ""
+    half = row.combined[k]
+    if half is not None and math.isfinite(half) and half > 0.0 and apart != 0.0:
+        said, _ = bounded(factor * apart, factor * half)
+        signed = row.any.kind != "horizontal" and said.strip("0.") and not said.startswith(MINUS)
+        return f"+{said}" if signed else said
     if row.any.kind == "horizontal":
         return plain(apart, decimals(apart, 2)) if apart else SAME
     if apart == 0.0:

@@ -116,7 +116,7 @@ def live_info() -> dict[str, Any]:
             }
             for name, one in PROTOCOLS.items()
         ],
-        "warning": Finding("studio.live-open").sentence("file"),
+        "warning": Finding("studio.live-open").sentence("studio"),
     }
 
 

@@ -53,9 +53,9 @@ def quick(folder: Path, toml: str, changes: Mapping[str, Any], unit: int = 0) ->
     Returns
     -------
     dict
-        ``delta_v`` (value and bound, m/s, and both as the report shows them; None without an event), ``pdof`` (deg, and the hour of
-        the clock), ``path`` with the longer half axis of the ellipse of each point, m;
-        ``vehicle``, ``recorder``, and ``ms`` that it took.
+        ``delta_v`` (value and bound, m/s, and both as the report shows them; None without an
+        event), ``pdof`` (deg, and the hour of the clock), ``path`` with the longer half axis of the
+        ellipse of each point, m; ``vehicle``, ``recorder``, and ``ms`` that it took.
     """
     begun = time.perf_counter()
     spec = checked(folder, KINDS["crash"], toml, changes=changes)

@@ -24,7 +24,7 @@ import pandas as pd
 
 from strapdown import rotation
 from strapdown.bundle import MANIFEST, SIGNATURE_FILE, UNSEALED, read_manifest, sha256
-from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.studio.folder import Folder
 from strapdown.studio.kinds import KINDS
 from strapdown.studio.look import kept_stream
@@ -241,15 +241,39 @@ def _finite(value: Any) -> Any:
 
 
 def _finding(one: Any) -> dict[str, Any]:
-    """Return a finding of a result as the front end shows findings."""
+    """Return a finding of a result as the front end shows findings, in the words of the studio.
+
+    One that this version does not know, or that has other data, is in those of the result.
+    """
+    said = {"text": _word(one, "sentence") or "", "remedy": _word(one, "remedy")}
+    with suppress(KeyError, ValueError, TypeError, IndexError, AttributeError, OSError):
+        again = _remade(one)
+        said = {"text": again.sentence("studio"), "remedy": again.advice("studio")}
     return {
         "code": _word(one, "code"),
         "severity": _word(one, "severity") or "note",
         "file": _word(one, "file"),
         "quantity": _word(one, "quantity"),
-        "text": _word(one, "sentence") or "",
-        "remedy": _word(one, "remedy"),
+        **said,
     }
+
+
+#: Code of a finding: a room of the catalogue, and what is wrong.
+CODE = re.compile(r"[a-z]+\.[a-z0-9-]+")
+
+
+def _remade(one: dict[str, Any]) -> Finding:
+    """Return a finding of the JSON of a result, with the findings among its data."""
+    if CODE.fullmatch(one["code"]) is None:
+        raise ValueError
+    data = {key: _value(value) for key, value in one["data"].items()}
+    return Finding(one["code"], severity="note", data=data)
+
+
+def _value(node: Any) -> Any:
+    if isinstance(node, dict):
+        return _remade(node)
+    return tuple(map(_value, node)) if isinstance(node, list) else node
 
 
 def _list(node: Any, key: str) -> list[Any]:

@@ -9,8 +9,8 @@ import pytest
 from strapdown.crash.pdof import AngleInterval
 from strapdown.report.values import (
     about,
-    bounded,
     angle_range,
+    bounded,
     heading_shown,
     instant,
     plain,
