@@ -32,6 +32,7 @@ function Result({ run }: { run: RunDetail }) {
     <Numbers numbers={run.numbers} />
     <div class="row exports" role="group" aria-label="Take it with you">
       {exports.filter(([, , has]) => has).map(([as, words]) => <a class="button" key={as} href={api.exportOf(run.name, as)} download>{words}</a>)}
+      {run.report && !run.has.pdf && <a class="button" href={run.report} target="_blank" rel="noopener noreferrer" title="It opens in a tab of its own, laid out for paper: print it there, or save it as a PDF (Ctrl+P)">Report to print or save as PDF</a>}
       <a class="button" href={`#/compare?run=${part(run.name)}`}>Compare with another</a>
     </div>
     {run.findings.length > 0 && <Part title="What was noticed"><Findings findings={run.findings} /></Part>}

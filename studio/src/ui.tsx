@@ -175,6 +175,7 @@ export function Control({ field, value, fault, onChange }: {
     onChange(numbers);
   };
   const byDefault = field.default === undefined || field.default === null || field.default === "" ? "" : shown(field.default);
+  const usual = field.type === "flag" ? (field.default === true ? "yes" : field.default === false ? "no" : "") : byDefault && withUnit(field.default, field.unit ?? "");
   let control: JSX.Element;
   if (field.type === "flag") {
     control = <input {...common} type="checkbox" checked={Boolean(value ?? field.default)} onChange={(e) => onChange(e.currentTarget.checked)} />;
@@ -195,7 +196,7 @@ export function Control({ field, value, fault, onChange }: {
     <label for={id}>{field.label}</label>
     <span class="withunit">{control}{field.unit && <span class="unit">{field.unit}</span>}</span>
     {(fault || own) && <p class="fault" id={`${id}f`}>{fault ?? own}</p>}
-    {field.help && <p class="help" id={`${id}h`}>{sentence(field.help)}</p>}
+    {field.help && <p class="help" id={`${id}h`}>{sentence(field.help)}{usual && ` Default: ${usual}.`}</p>}
   </div>;
 }
 

@@ -669,7 +669,7 @@ def _refuse_opposite_sign(stretch: Stretch) -> None:
             "calibrate.turn-sign",
             quantity="turns",
             axis="xyz"[axis],
-            known=known.rate / DEG,
+            stated=known.rate / DEG,
             measured=measured / DEG,
             start=known.start,
             end=known.end,
