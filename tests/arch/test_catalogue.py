@@ -22,7 +22,11 @@ CATALOGUE = {
 }
 ROOMS = {file.stem for file in (SOURCE / "messages").glob("*.toml")}
 CODE = re.compile(r"[a-z_]+\.[a-z0-9]+(?:-[a-z0-9]+)*")
-PARTS = {"what", "remedy", *(f"{p}_{w}" for p in ("what", "remedy") for w in ("cli", "file", "studio"))}
+PARTS = {
+    "what",
+    "remedy",
+    *(f"{p}_{w}" for p in ("what", "remedy") for w in ("cli", "file", "studio")),
+}
 LOCATION = {"severity", "file", "row", "quantity", "line", "data"}
 #: Entries whose data have a `nearest` of another meaning.
 OWN_NEAREST = {"attitude.hz-asked-hz"}

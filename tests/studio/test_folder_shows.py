@@ -81,13 +81,23 @@ def test_a_live_run_navigates_by_a_configuration_of_the_folder(tmp_path):
     outside.write_text("", encoding="utf-8")
     leads_out = RUN.replace('"adis16495-1"', f'"{outside.as_posix()}"')
     (tmp_path / "out.toml").write_text(leads_out, encoding="utf-8")
-    for name in ("missing.toml", "../sensor.toml", "-run.toml", "wrong.toml", "out.toml", "log.csv", 3):
+    for name in (
+        "missing.toml",
+        "../sensor.toml",
+        "-run.toml",
+        "wrong.toml",
+        "out.toml",
+        "log.csv",
+        3,
+    ):
         with pytest.raises(ConfigError):
             live_command(tmp_path, "walk", "udp", {"run": name})
 
 
 def test_commands_of_live_runs(tmp_path):
-    words = live_command(tmp_path, "walk", "sensor-logger", {"listen": "0.0.0.0:8437", "every": 0.5})
+    words = live_command(
+        tmp_path, "walk", "sensor-logger", {"listen": "0.0.0.0:8437", "every": 0.5}
+    )
     assert words == [
         *("live", "--listen=0.0.0.0:8437", "--platform=auto", "--every=0.5"),
         *("--lines=json", "--out", "walk"),

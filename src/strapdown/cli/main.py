@@ -24,7 +24,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from strapdown import __version__
 from strapdown.cli.console import RESOURCES, WORDS, logged, tell
-from strapdown.errors import ConfigError, Finding, StrapdownError, printable
+from strapdown.errors import ConfigError, Finding, StrapdownError, Words, printable
 from strapdown.parsers import start_for
 
 _RESEND_S = 0.005

@@ -127,9 +127,7 @@ def live_info() -> dict[str, Any]:
     }
 
 
-def live_command(
-    folder: Path, name: str, protocol: str, options: Mapping[str, Any]
-) -> list[str]:
+def live_command(folder: Path, name: str, protocol: str, options: Mapping[str, Any]) -> list[str]:
     """Return the command of a live run, as words after ``strapdown``.
 
     Parameters
