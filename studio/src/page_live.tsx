@@ -64,7 +64,7 @@ function Begin() {
           <input type="radio" name="protocol" checked={one === chosen} onChange={() => { setProtocol(one.name); setOptions({}); }} />
           <span class="name">{one.title}</span><span class="soft">{one.help}</span></label>)}
       </fieldset>
-      <div class="fields runfile"><div class="field">
+      <div class="fields wide runfile"><div class="field">
         <label for="liverun">What is computed</label>
         <select id="liverun" aria-describedby="liverunhelp" value={run} onChange={(e) => setRun(e.currentTarget.value)}>
           <option value="">Attitude, by an orientation filter</option>

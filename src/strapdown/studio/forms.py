@@ -40,6 +40,12 @@ SHOWN = {
     "_n_per_m": "N/m",
     "_kg": "kg",
     "_deg_per_s": "deg/s",
+    "_deg_per_h": "deg/h",
+    "_ug": "µg",
+    "_mg": "mg",
+    "_ut": "µT",
+    "_db": "dB",
+    "_mb": "MB",
     "_deg": "deg",
     "_hz": "Hz",
     "_percent": "%",
@@ -216,5 +222,5 @@ def _kind(hint: Any) -> tuple[str, list[Any]]:
 
 def _label(name: str) -> str:
     """Name of a key in words, without its unit."""
-    words = name.removesuffix(_ending(name, (*UNITS, "_percent"))) if unit_of(name) else name
+    words = name.removesuffix(_ending(name, (*UNITS, *SHOWN))) if unit_of(name) else name
     return words.replace("_", " ").capitalize().replace("gnss", "GNSS").replace("Gnss", "GNSS")
