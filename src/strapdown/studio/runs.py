@@ -216,7 +216,8 @@ def options_table(sealed: SealedRun) -> list[dict[str, Any]]:
     rows = []
     for key, value in list(options_of(sealed).items())[:MOST]:
         path = re.sub(r"\[[^\]]*\]", "[]", key)
-        field = known.get(path) or next((f for form, f in named if form.fullmatch(path)), {})
+        by_name = (field for form, field in named if form.fullmatch(path))
+        field: dict[str, Any] = known.get(path) or next(by_name, {})
         plain = value if isinstance(value, bool | int | float | str | list) else str(value)
         rows.append(
             {
