@@ -265,6 +265,10 @@ def test_a_result_is_told_as_people_read_it(tmp_path, monkeypatch):
     found = runs.run(tmp_path, "a")
     (finding,) = found["findings"]
     assert finding["code"] == "io.axes-not-stated" and "--" not in finding["remedy"]
+    by_label = {one["label"]: one for one in found["numbers"]}
+    assert by_label["heading"]["value"] == "63.8" and by_label["heading"]["unit"] == "deg"
+    assert by_label["heading"]["bound"].replace("\u00a0", " ") == "± 2.5"
+    assert by_label["pitch"]["value"] == "0.0"
     by_key = {one["key"]: one for one in found["options"]}
     duration = by_key["coarse.duration_s"]
     assert (duration["value"], duration["unit"], duration["default"]) == (60.0, "s", None)
@@ -275,8 +279,9 @@ def test_a_result_is_told_as_people_read_it(tmp_path, monkeypatch):
     both = runs.compare(tmp_path, ["a", "b"])
     assert [row["key"] for row in both["options"]] == ["coarse.duration_s"]
     assert [one["key"] for one in both["same_options"]] == ["log.repair"]
-    for row in both["numbers"]:
-        assert len(row["shown"]["values"]) == len(row["shown"]["bounds"]) == 2
+    (heading,) = [row for row in both["numbers"] if row["quantity"] == "heading"]
+    assert heading["shown"]["values"] == ["63.8", "71.5"] and not heading["detail"]
+    assert heading["shown"]["differences"][1] == "+7.7" and heading["within"][1] is False
 
 
 def test_a_finding_that_is_not_known_is_in_the_words_of_its_result():
