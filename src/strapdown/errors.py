@@ -4,7 +4,8 @@ A `Finding` says in a form that programs can read what a stage noticed; an error
 ended the work. Neither holds a sentence. The sentences are in one catalogue, `messages/*.toml`,
 a file for each room: ``code = {what, remedy}`` as templates over the data, with the words of an
 interface where they differ (``remedy_cli`` for options, ``remedy_file`` for the keys of a
-configuration, which is given to a command: without words of its own it takes those of options).
+configuration, which is given to a command: without words of its own it takes those of options;
+``remedy_studio`` for the pages of the studio, which have these keys).
 `Finding.sentence` and `Finding.advice` fill them in. No logic reads them: it
 reads `code`, `severity` and `data`.
 
@@ -47,8 +48,9 @@ __all__ = [
 
 #: A note informs, a warning speaks against a result, an error ended the work.
 Severity = Literal["note", "warning", "error"]
-#: Whose words a sentence speaks: arguments, options, or the keys of a configuration.
-Words = Literal["python", "cli", "file"]
+#: Whose words a sentence speaks: arguments, options, the keys of a configuration, or what the pages
+#: of the studio name.
+Words = Literal["python", "cli", "file", "studio"]
 
 _LOCATION = ("file", "row", "quantity", "line")
 
@@ -314,9 +316,18 @@ def _entry(code: str) -> Mapping[str, str]:
     return tomllib.loads(_entries(room)[name])
 
 
+#: Endings of the templates of each vocabulary, the first that an entry has; then that of Python.
+_FORMS: Mapping[Words, tuple[str, ...]] = {
+    "python": (),
+    "cli": ("_cli",),
+    "file": ("_file", "_cli"),
+    "studio": ("_studio", "_file", "_cli"),
+}
+
+
 def _text(finding: Finding, part: str, words: Words) -> str:
     entry = _entry(finding.code)
-    forms = {"python": (), "cli": ("_cli",), "file": ("_file", "_cli")}[words]
+    forms = _FORMS[words]
     template = next((entry[part + form] for form in (*forms, "") if part + form in entry), "")
     return _Sentence(words).vformat(template, (), finding.data) if template else ""
 

@@ -72,7 +72,7 @@ export function CrashPreview({ toml, values, ready, onKeep }: {
     {quick && <div class="crash">
       <div>
         <dl class="keys" aria-live="polite">
-          <div><dt>Change of velocity (delta-V)</dt>{quick.delta_v ? <dd>{quick.delta_v.at_least ? "at least " : ""}{number(quick.delta_v.value * 3.6, 3)} <small>± {bounded(quick.delta_v.bound, 3.6)} km/h</small></dd> : <dd><small>no impact in this record</small></dd>}</div>
+          <div><dt>Change of velocity (delta-V)</dt>{quick.delta_v ? <dd>{quick.delta_v.shown}</dd> : <dd><small>no impact in this record</small></dd>}</div>
           <div><dt>Direction of force</dt>{quick.pdof ? <dd>{quick.pdof.clock} o'clock <small>{number(quick.pdof.deg, 3)}°{quick.pdof.low !== null && quick.pdof.high !== null ? ` (${number(quick.pdof.low, 3)}° to ${number(quick.pdof.high, 3)}°)` : ", without a bound"}</small></dd> : <dd><small>–</small></dd>}</div>
         </dl>
         <p class="help">95 % bounds of one recorder, linear and fast. The run computes them in full.</p>
@@ -94,8 +94,6 @@ export function CrashPreview({ toml, values, ready, onKeep }: {
     {quick && <Findings findings={quick.findings} />}
   </Part>;
 }
-
-const bounded = (bound: number | null, factor: number) => bound === null ? "∞" : number(bound * factor, 2);
 
 /** The clock face around the vehicle: 12 is ahead, 3 the right side; the arrow is the force. */
 export function ClockFace({ deg, low, high, before }: { deg: number; low: number | null; high: number | null; before: number | null }) {

@@ -11,13 +11,6 @@ export function number(value: number, digits = 4): string {
   return text.includes(".") ? text.replace(/0+$/, "").replace(/\.$/, "") : text;
 }
 
-/** A number with as many decimals as its bound has meaning: two digits of the bound. */
-export function withBound(value: number, bound: number): string {
-  if (!(bound > 0) || !Number.isFinite(bound)) return number(value, 5);
-  const decimals = Math.max(0, 1 - Math.floor(Math.log10(bound)));
-  return decimals > 8 ? number(value, 5) : value.toFixed(decimals);
-}
-
 /** Any value of the server as text; a number to four digits. */
 export function shown(value: unknown): string {
   if (value === null || value === undefined) return "–";

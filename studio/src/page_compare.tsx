@@ -2,10 +2,10 @@
 
 import { useState } from "preact/hooks";
 import { api, problemOf } from "./api";
-import { date, number, plural, shown } from "./format";
+import { date, plural, shown } from "./format";
 import { useShared } from "./store";
 import type { Comparison, Problem } from "./types";
-import { Busy, Empty, Findings, More, Page, Part, Table, Trouble } from "./ui";
+import { Busy, Command, Empty, Findings, More, Options, Page, Part, Table, Trouble, written } from "./ui";
 
 export function ComparePage({ chosen: first }: { chosen: string[] }) {
   const { state } = useShared();
@@ -41,52 +41,61 @@ export function ComparePage({ chosen: first }: { chosen: string[] }) {
   </Page>;
 }
 
-/** Values in a row, marked where they differ; the first run is what the others are held against. */
+type Row = Comparison["numbers"][number];
+
+/** Options that are shown before the rest is folded. */
+const FEW = 8;
+
+/** What differs first: numbers with bounds, then options; what is the same is folded. */
 function Found({ found }: { found: Comparison }) {
-  const names = found.runs.map((run) => run.name);
-  const [all, setAll] = useState(false);
-  const numbers = found.numbers.filter((row) => all || !row.same);
+  const names = found.runs.map((run) => run.name), others = names.slice(1);
+  const differ = found.numbers.filter((row) => !row.same);
+  const main = differ.filter((row) => row.shown.bounds.some(Boolean) && !row.detail);
+  const rest = differ.filter((row) => !main.includes(row)), same = found.numbers.filter((row) => row.same);
   const findings = found.findings_of_runs.filter((one) => one.differs);
   const inputs = found.inputs.filter((row) => !row.same);
-  const others = names.slice(1);
+  const options = (some: Comparison["options"]) => <Table stack head={["Option", ...names]} rows={some.map((row) => [<code>{row.key}</code>, ...row.values.map((one) => one === null ? "none" : written(one))])} />;
+  const numbers = (some: Row[]) => [...new Set(some.map((row) => row.group))].map((group) => <Table stack key={group} caption={group || "Result"}
+    head={["Quantity", ...names, ...others.map((name) => others.length > 1 ? `Difference of ${name}` : "Difference")]} numeric={[...names, ...others].map((_, i) => i + 1)}
+    rows={some.filter((row) => row.group === group).map((row) => [
+      row.shown.unit ? <>{row.quantity}, <span class="bare">{row.shown.unit}</span></> : row.quantity,
+      ...row.shown.values.map((value, i) => [value, row.shown.bounds[i], row.shown.bounds[i] && row.shown.bound_unit !== row.shown.unit ? row.shown.bound_unit : ""].filter(Boolean).join("\u00a0")),
+      ...others.map((_, i) => <Difference row={row} i={i + 1} />),
+    ])} />);
   return <>
     <p class="lead" role="status">{found.summary}</p>
     <Findings findings={found.findings} />
-    <Part title="Options">
-      {found.options.length ? <Table head={["Option", ...names]} rows={found.options.map((row) => [<code>{row.key}</code>, ...row.values.map(shown)])} /> : <Empty>No option differs.</Empty>}
-      <p class="soft">{plural(found.equal_options, "option is", "options are")} the same.</p>
+    <Part title="Numbers that differ">
+      {!differ.length && <Empty>No number differs.</Empty>}
+      {main.length > 0 && <p class="help">With 95 % bounds. A difference is a result minus {names[0]}; its bound is that of two independent errors.</p>}
+      {numbers(main)}
+      {rest.length > 0 && <More title={main.length ? plural(rest.length, "further number", "further numbers") : plural(rest.length, "number")} open={!main.length}>{numbers(rest)}</More>}
+      {same.length > 0 && <More title={`${plural(same.length, "number")} that ${same.length === 1 ? "is" : "are"} the same`}>{numbers(same)}</More>}
+    </Part>
+    <Part title="Options that differ">
+      {found.options.length ? options(found.options.slice(0, FEW)) : <Empty>No option differs.</Empty>}
+      {found.options.length > FEW && <More title={plural(found.options.length - FEW, "further option")}>{options(found.options.slice(FEW))}</More>}
+      {found.equal_options > 0 && <More title={plural(found.equal_options, "option is the same", "options are the same")}><Options options={found.same_options} folded /></More>}
     </Part>
     <Part title="Inputs">
-      {inputs.length ? <Table head={["Role", ...names]} rows={inputs.map((row) => [row.role, ...row.files.map((file, i) => file ? `${file.name} (${row.status[i] ?? ""})` : "none")])} /> : <Empty>All inputs are the same, to the byte.</Empty>}
-      {found.conditions.some((c) => new Set(c.values).size > 1) && <Table head={["Software", ...names]} rows={found.conditions.filter((c) => new Set(c.values).size > 1).map((c) => [c.name, ...c.values.map(shown)])} />}
-    </Part>
-    <Part title="Numbers" aside={<label class="inline"><input type="checkbox" checked={all} onChange={(e) => setAll(e.currentTarget.checked)} />Those that are the same, too</label>}>
-      {!numbers.length && <Empty>No number differs.</Empty>}
-      {[...new Set(numbers.map((row) => row.group))].map((group) => <More key={group} title={group} open={!DETAILS.test(group)}>
-        <Table head={["Quantity", ...names, ...others.map((name) => `Difference of ${name}`), "Unit"]} numeric={[...names, ...others].map((_, i) => i + 1)}
-          rows={numbers.filter((row) => row.group === group).map((row) => [row.quantity,
-            ...row.values.map((value, i) => `${value === null ? "" : typeof value === "number" && row.unit === "deg" && row.difference_unit === "m" ? value.toFixed(7) : shown(value)}${bound(row.below_95[i], row.above_95[i], row.difference_unit === row.unit ? "" : row.difference_unit)}` || "–"),
-            ...others.map((_, i) => difference(row, i + 1)), row.unit ?? ""])} />
-      </More>)}
+      {inputs.length ? <Table stack head={["Used as", ...names]} rows={inputs.map((row) => [row.role, ...row.files.map((file, i) => file ? `${file.name} (${STATUS[row.status[i] ?? ""] ?? row.status[i] ?? ""})` : "none")])} /> : <Empty>All inputs are the same, to the byte.</Empty>}
+      {found.conditions.some((c) => new Set(c.values).size > 1) && <Table stack head={["Software", ...names]} rows={found.conditions.filter((c) => new Set(c.values).size > 1).map((c) => [c.name, ...c.values.map(shown)])} />}
     </Part>
     {findings.length > 0 && <Part title="Findings that differ">
-      <Table head={["Finding", ...names.map((name) => `In ${name}`)]} numeric={names.map((_, i) => i + 1)} rows={findings.map((one) => [one.sentence, ...one.counts.map(String)])} />
+      <Table stack head={["Finding", ...names.map((name) => `In ${name}`)]} numeric={names.map((_, i) => i + 1)} rows={findings.map((one) => [one.sentence, ...one.counts.map((n) => n === 0 ? "no" : n === 1 ? "yes" : `${n} times`)])} />
     </Part>}
     {found.page && <Part title="The page" aside={<a href={found.page} target="_blank" rel="noopener noreferrer">Open in a tab of its own</a>}>
       <iframe class="report" title="The comparison as a page" sandbox="allow-scripts" referrerpolicy="no-referrer" src={found.page} /></Part>}
+    {found.command_line && <Part title="The same from a terminal"><Command text={found.command_line} /></Part>}
   </>;
 }
 
-/** What few people ask for: folded at first. */
-const DETAILS = /^(Estimated|Measurements|Shares|Errors by|Coarse)/;
+/** How a file stands to that of the first result. */
+const STATUS: Record<string, string> = { first: "as the first has it", same: "the same", renamed: "the same under another name", changed: "another content", missing: "not there" };
 
-function difference(row: Comparison["numbers"][number], i: number): string {
-  const value = row.differences[i];
-  if (value === null || value === undefined) return "–";
-  return `${shown(value)}${row.difference_unit !== row.unit ? ` ${row.difference_unit}` : ""}${row.within[i] === false ? " (beyond both bounds)" : ""}`;
-}
-
-function bound(below: number | null | undefined, above: number | null | undefined, unit: string | null): string {
-  if (below === null || below === undefined || above === null || above === undefined) return "";
-  return (below === above ? ` ± ${number(below, 2)}` : ` −${number(below, 2)}/+${number(above, 2)}`) + (unit ? ` ${unit}` : "");
+/** A difference with its bound, marked where it is beyond. */
+function Difference({ row, i }: { row: Row; i: number }) {
+  const { differences, combined, unit, bound_unit } = row.shown;
+  if (!differences[i]) return <>–</>;
+  return <>{differences[i]}{differences[i] !== "same" && <> {combined[i]} {bound_unit !== unit && bound_unit}</>}{row.within[i] === false && <span class="apart"> beyond its bound</span>}</>;
 }

@@ -36,6 +36,8 @@ function Begin() {
     return `live-${i}`;
   });
   const [options, setOptions] = useState<Record<string, unknown>>({});
+  const [run, setRun] = useState("");
+  const configurations = (state?.files ?? []).map((file) => file.name).filter((one) => one.toLowerCase().endsWith(".toml") && !one.includes("/"));
   const [problem, setProblem] = useState<Problem | null>(null);
   const chosen = info.value?.protocols.find((one) => one.name === protocol) ?? info.value?.protocols[0];
   const taken = state?.runs.some((run) => run.name === name) || state?.files.some((file) => file.name === name) || state?.jobs.some((job) => job.name === name && (job.state === "running" || job.state === "waiting"));
@@ -43,7 +45,7 @@ function Begin() {
     if (!chosen) return;
     setProblem(null);
     try {
-      const job = await api.begin({ kind: "live", name, protocol: chosen.name, options });
+      const job = await api.begin({ kind: "live", name, protocol: chosen.name, options: run ? { ...options, run } : options });
       putJob(job);
       location.hash = `#/live/${encodeURIComponent(job.id)}`;
     } catch (error) {
@@ -62,6 +64,14 @@ function Begin() {
           <input type="radio" name="protocol" checked={one === chosen} onChange={() => { setProtocol(one.name); setOptions({}); }} />
           <span class="name">{one.title}</span><span class="soft">{one.help}</span></label>)}
       </fieldset>
+      <div class="fields wide runfile"><div class="field">
+        <label for="liverun">What is computed</label>
+        <select id="liverun" aria-describedby="liverunhelp" value={run} onChange={(e) => setRun(e.currentTarget.value)}>
+          <option value="">Attitude, by an orientation filter</option>
+          {configurations.map((one) => <option key={one} value={one}>Navigation by {one}</option>)}
+        </select>
+        <p class="help" id="liverunhelp">{configurations.length ? "A configuration of a navigation gives position and velocity, too; its sensor, start and aiding are used, its log is not." : "For position and velocity, too, bring the configuration of a navigation (.toml) into the folder, or set one up from a log of this sensor."}</p>
+      </div></div>
       <div class="fields">{chosen.fields.map((field) => <Control key={`${chosen.name}.${field.key}`} field={field} value={options[field.key]}
         onChange={(value) => { const rest = { ...options }; if (value === null) delete rest[field.key]; else rest[field.key] = value; setOptions(rest); }} />)}</div>
       {info.value!.warning && <p class="notice warn">{sentence(info.value!.warning)}</p>}

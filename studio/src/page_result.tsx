@@ -4,11 +4,11 @@
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { api, part } from "./api";
 import { Attitude, fromEuler } from "./attitude";
-import { date, number, plural, shown, stamp, withBound } from "./format";
+import { bytes, date, plural, stamp } from "./format";
 import { indexOf, METERS_PER_DEG, Plan } from "./plan";
 import { Traces, type Panel } from "./traces";
 import type { KeyNumber, RunDetail, Series as SeriesData, Span, Track } from "./types";
-import { Busy, Command, Empty, Findings, More, Page, Part, Table, Trouble, useRequest } from "./ui";
+import { Busy, Command, Empty, Findings, More, Options, Page, Part, Table, Trouble, useRequest } from "./ui";
 
 export function ResultPage({ name }: { name: string }) {
   const run = useRequest(() => api.run(name), [name]);
@@ -32,6 +32,7 @@ function Result({ run }: { run: RunDetail }) {
     <Numbers numbers={run.numbers} />
     <div class="row exports" role="group" aria-label="Take it with you">
       {exports.filter(([, , has]) => has).map(([as, words]) => <a class="button" key={as} href={api.exportOf(run.name, as)} download>{words}</a>)}
+      {run.report && !run.has.pdf && <a class="button" href={run.report} target="_blank" rel="noopener noreferrer" title="It opens in a tab of its own, laid out for paper: print it there, or save it as a PDF (Ctrl+P)">Report to print or save as PDF</a>}
       <a class="button" href={`#/compare?run=${part(run.name)}`}>Compare with another</a>
     </div>
     {run.findings.length > 0 && <Part title="What was noticed"><Findings findings={run.findings} /></Part>}
@@ -45,7 +46,10 @@ function Result({ run }: { run: RunDetail }) {
       <p>This command gives the same result to the last bit:</p>
       <Command text={run.command_line} />
       <p class="soft">Made {date(run.made)}. Seal <code class="digest">{run.digest}</code></p>
-      <More title="Options and inputs"><pre tabIndex={0}>{JSON.stringify({ options: run.options, inputs: run.inputs }, null, 2)}</pre></More>
+      <More title={<>Options <span class="soft">{plural(run.options.filter((one) => !one.usual).length, "option")} set, {run.options.filter((one) => one.usual).length} as by default</span></>}><Options options={run.options} /></More>
+      <More title={<>Inputs <span class="soft">{plural(run.inputs.length, "file")}</span></>}>
+        {run.inputs.length ? <Table stack head={["File", "Used as", "Size", "SHA-256"]} rows={run.inputs.map((one) => [one.name, one.role, one.bytes === null ? "" : bytes(one.bytes), <code class="digest">{one.sha256 ?? ""}</code>])} /> : <Empty>None: everything is in the options.</Empty>}
+      </More>
     </Part>
   </>;
 }
@@ -61,37 +65,30 @@ const MAIN = [
   /^At the end: roll$/, /^At the end: pitch$/, /: algorithm$/, /: lowest rate$/, /: shortest time/,
 ];
 
-function bound({ below, above }: KeyNumber): string {
-  if ((below ?? null) === null && (above ?? null) === null) return "";
-  return below === above ? `± ${number(below!, 2)}` : `− ${below === null ? "∞" : number(below!, 2)}, + ${above === null ? "∞" : number(above!, 2)}`;
+/** "63.1 ± 2.5 km/h": value, bound and unit in one; of a latitude "37.72549° ± 1.2 m". */
+function said({ value, bound, unit, bound_unit }: KeyNumber): string {
+  const parts = !bound ? [value, unit] : unit === bound_unit ? [value, bound, unit] : [value, unit, bound, bound_unit];
+  return parts.filter(Boolean).join("\u00a0");
 }
 
-const valueOf = (one: KeyNumber) => typeof one.value === "number" && unitOfBound(one) === one.unit && (one.below ?? one.above) ? withBound(one.value, Math.min(one.below ?? Infinity, one.above ?? Infinity)) : typeof one.value === "number" && one.unit === "deg" && unitOfBound(one) === "m" ? one.value.toFixed(7) : shown(one.value);
-
-/** Latitude and longitude are in degrees, their bounds in meters. */
-const unitOfBound = (one: KeyNumber) => one.bound_unit ?? (/^(latitude|longitude)$/.test(one.label) ? "m" : one.unit);
-
-/** Speeds of vehicles, as people say them. */
-function spoken(one: KeyNumber): KeyNumber {
-  if (!/delta-V/i.test(one.label) || one.unit !== "m/s" || typeof one.value !== "number") return one;
-  const times = (v: number | null | undefined) => v === null || v === undefined ? null : v * 3.6;
-  return { ...one, value: one.value * 3.6, below: times(one.below), above: times(one.above), unit: "km/h", bound_unit: "km/h" };
-}
+/** What a name alone leaves open. */
+const MEANS: [RegExp, string][] = [[/^delta-V$/, "change of velocity in the impact, no speed of travel"], [/direction of force/, "0 is from ahead, clockwise"]];
 
 /** The numbers that matter first, large; all in a table. */
-function Numbers({ numbers }: { numbers: KeyNumber[] }) {
-  if (!numbers.length) return null;
-  const all = numbers.map(spoken);
-  const main = MAIN.flatMap((pattern) => all.filter((one) => pattern.test(`${one.group ?? ""}: ${one.label}`)).slice(0, 1)).slice(0, 6);
-  const large = main.length ? main : all.filter((one) => one.value !== null && bound(one)).slice(0, 4);
+function Numbers({ numbers: all }: { numbers: KeyNumber[] }) {
+  if (!all.length) return null;
+  const main = MAIN.flatMap((pattern) => all.filter((one) => pattern.test(`${one.group}: ${one.label}`)).slice(0, 1)).slice(0, 6);
+  const large = main.length ? main : all.filter((one) => one.value && one.bound).slice(0, 4);
   return <>
     {large.length > 0 && <dl class="keys">
-      {large.map((one) => <div key={`${one.group} ${one.label}`}><dt>{[one.label.replace(/^./, (c) => c.toUpperCase()), one.group?.toLowerCase() === "at the end" ? "at the end" : "", one.group?.startsWith("Errors against") ? "against the reference" : ""].filter(Boolean).join(" ")}</dt>
-        <dd>{one.value === null ? `${bound(one)} ${one.unit}` : valueOf(one)} {one.value !== null && <small>{bound(one)} {one.unit}</small>}</dd></div>)}
+      {large.map((one) => <div key={`${one.group} ${one.label}`}><dt>{[one.label.replace(/^./, (c) => c.toUpperCase()), one.group.toLowerCase() === "at the end" ? "at the end" : "", one.group.startsWith("Errors against") ? "against the reference" : ""].filter(Boolean).join(" ")}</dt>
+        <dd>{one.value ? <>{one.value} <small>{one.bound} {one.bound ? one.bound_unit : one.unit}</small></> : said(one)}</dd>
+        {MEANS.filter(([pattern]) => pattern.test(one.label)).map(([, words]) => <dd class="means" key={words}>{words}</dd>)}</div>)}
     </dl>}
-    {large.some(bound) && <p class="help">Bounds hold 95 % of the time.</p>}
+    {large.some((one) => one.bound) && <p class="help">Bounds hold 95 % of the time.</p>}
     <More title={`All ${plural(all.length, "number")}`}>
-      <Table head={["", "Quantity", "Value", "Unit", "95 % bound"]} numeric={[2, 4]} rows={all.map((one) => [one.group ?? "", one.label, valueOf(one), one.unit ?? "", bound(one) && `${bound(one)} ${unitOfBound(one) ?? ""}`])} />
+      <div class="pairs">{[...new Set(all.map((one) => one.group))].map((group) => <Table key={group} caption={group || "Result"} head={["Quantity", "Value with 95 % bound"]} numeric={[1]}
+        rows={all.filter((one) => one.group === group).map((one) => [one.label, said(one)])} />)}</div>
     </More>
   </>;
 }

@@ -103,17 +103,25 @@ export interface Checked {
   findings?: Finding[];
 }
 
+/** A number as the reports show it: value and 95 % bound as texts, the bound empty without one. */
 export interface KeyNumber {
-  group?: string; label: string; value: number | string | null; unit: string | null;
-  /** Distance of the lower and of the upper bound; null without an end. */
-  below?: number | null; above?: number | null; bound_unit?: string | null;
+  group: string; label: string; value: string; bound: string; unit: string;
+  /** Of a latitude or a longitude the bound is along the ground. */
+  bound_unit: string;
 }
+
+/** An option of a result; `usual`: it is as by default. */
+export interface Option {
+  key: string; label: string | null; value: unknown; unit: string; default: unknown; usual: boolean; help: string;
+}
+
+export interface Input { role: string; name: string; kept: string | null; sha256: string | null; bytes: number | null }
 
 export interface RunDetail extends Run {
   /** False where the path of a crash is along the axes of the vehicle at its entry. */
   over_ground?: boolean;
   command_line: string; answer?: string | null; job?: string | null;
-  numbers: KeyNumber[]; options: unknown; inputs: unknown; findings: Finding[];
+  numbers: KeyNumber[]; options: Option[]; inputs: Input[]; findings: Finding[];
   from_s?: number; to_s?: number;
   panels?: { title: string; unit: string; columns: { name: string; label: string }[] }[];
   report: string | null; has: { track?: boolean; attitude?: boolean; series?: boolean; pdf?: boolean; toml?: boolean };
@@ -131,7 +139,7 @@ export interface Track {
 export interface MapInfo { tiles: string | null; min: number; max: number; attribution: string | null }
 
 export interface CrashQuick {
-  delta_v: { value: number; bound: number | null; at_least?: boolean; unit: string; forward: number; right: number } | null;
+  delta_v: { value: number; bound: number | null; shown: string; at_least?: boolean; unit: string; forward: number; right: number } | null;
   pdof: { deg: number; low: number | null; high: number | null; clock: number } | null;
   path: { t: number[]; north: number[]; east: number[]; heading: number[]; bound: number[] };
   /** The outline: corners forward, right of the origin of positions. */
@@ -153,9 +161,11 @@ export interface Comparison {
   inputs: { role: string; same: boolean; status: string[]; files: ({ name: string } | null)[] }[];
   conditions: { name: string; values: (string | null)[] }[];
   numbers: {
-    group: string; quantity: string; unit: string | null; difference_unit: string | null; same: boolean; values: (number | string | null)[];
-    below_95: (number | null)[]; above_95: (number | null)[]; differences: (number | null)[]; within: (boolean | null)[];
+    group: string; quantity: string; same: boolean; detail: boolean; within: (boolean | null)[];
+    /** As the reports show them; differences from the first run, with the bound of each. */
+    shown: { unit: string; bound_unit: string; values: string[]; bounds: string[]; differences: string[]; combined: string[] };
   }[];
+  same_options: Option[];
   findings_of_runs: { code: string; sentence: string; differs: boolean; counts: number[] }[];
-  findings: Finding[]; page?: string | null;
+  findings: Finding[]; page?: string | null; command_line?: string;
 }

@@ -4,8 +4,8 @@
 import type { ComponentChildren, JSX } from "preact";
 import { useEffect, useId, useRef, useState } from "preact/hooks";
 import { problemOf } from "./api";
-import { shown } from "./format";
-import type { Choice, Field, Finding, Problem, Question } from "./types";
+import { number, shown } from "./format";
+import type { Choice, Field, Finding, Option, Problem, Question } from "./types";
 
 /** The state of one request: begun again when `keys` change, an old answer never over a new one. */
 export function useRequest<T>(ask: ((signal: AbortSignal) => Promise<T>) | null, keys: unknown[]) {
@@ -180,6 +180,7 @@ export function Control({ field, value, fault, onChange }: {
     onChange(numbers);
   };
   const byDefault = field.default === undefined || field.default === null || field.default === "" ? "" : shown(field.default);
+  const usual = field.type === "flag" ? (field.default === true ? "yes" : field.default === false ? "no" : "") : byDefault && withUnit(field.default, field.unit ?? "");
   let control: JSX.Element;
   if (field.type === "flag") {
     control = <input {...common} type="checkbox" checked={Boolean(value ?? field.default)} onChange={(e) => onChange(e.currentTarget.checked)} />;
@@ -200,7 +201,7 @@ export function Control({ field, value, fault, onChange }: {
     <label for={id}>{field.label}</label>
     <span class="withunit">{control}{field.unit && <span class="unit">{field.unit}</span>}</span>
     {(fault || own) && <p class="fault" id={`${id}f`}>{fault ?? own}</p>}
-    {field.help && <p class="help" id={`${id}h`}>{sentence(field.help)}</p>}
+    {field.help && <p class="help" id={`${id}h`}>{sentence(field.help)}{usual && ` Default: ${usual}.`}</p>}
   </div>;
 }
 
@@ -223,14 +224,37 @@ export function Command({ text }: { text: string }) {
   return <div class="command"><code tabIndex={0}>{text}</code><Copy text={text} /></div>;
 }
 
-export function Table({ caption, head, rows, numeric = [] }: { caption?: string; head: string[]; rows: ComponentChildren[][]; numeric?: number[] }) {
-  return <div class="scroll" tabIndex={0} role="region" aria-label={caption ?? head.join(", ")}>
-    <table>
+/** `stack`: on a narrow page each row is a block, every cell under the words of its column. */
+export function Table({ caption, head, rows, numeric = [], stack = false }: { caption?: string; head: string[]; rows: ComponentChildren[][]; numeric?: number[]; stack?: boolean }) {
+  return <div class="scroll" tabIndex={0} role="region" aria-label={caption ?? head.filter(Boolean).join(", ")}>
+    <table role="table" class={stack ? "stack" : ""}>
       {caption && <caption>{caption}</caption>}
-      <thead><tr>{head.map((h, i) => <th scope="col" class={numeric.includes(i) ? "num" : ""} key={i}>{h}</th>)}</tr></thead>
-      <tbody>{rows.map((row, i) => <tr key={i}>{row.map((cell, j) => j === 0 ? <th scope="row" key={j}>{cell}</th> : <td class={numeric.includes(j) ? "num" : ""} key={j}>{cell}</td>)}</tr>)}</tbody>
+      <thead role="rowgroup"><tr role="row">{head.map((h, i) => <th role="columnheader" scope="col" class={numeric.includes(i) ? "num" : ""} key={i}>{h}</th>)}</tr></thead>
+      <tbody role="rowgroup">{rows.map((row, i) => <tr role="row" key={i}>{row.map((cell, j) => j === 0 ? <th role="rowheader" scope="row" key={j}>{cell}</th>
+        : <td role="cell" class={numeric.includes(j) ? "num" : ""} data-head={head[j]} key={j}>{cell}</td>)}</tr>)}</tbody>
     </table>
   </div>;
+}
+
+/** Options as a table: those that were set first, those as by default folded. */
+export function Options({ options, folded = false }: { options: Option[]; folded?: boolean }) {
+  const table = (some: Option[]) => <Table stack head={["Option", "Value", "Default"]} rows={some.map((one) => [
+    <>{one.label ? <>{one.label} <code class="soft">{one.key}</code></> : <code>{one.key}</code>}{one.help && <span class="help said">{sentence(one.help)}</span>}</>,
+    withUnit(one.value, one.unit), one.default === null ? "" : withUnit(one.default, one.unit),
+  ])} />;
+  const set = options.filter((one) => !one.usual), usual = options.filter((one) => one.usual);
+  return <>
+    {set.length > 0 && (folded ? <More title={`${set.length} that were set`}>{table(set)}</More> : table(set))}
+    {usual.length > 0 && <More title={`${usual.length} as by default`}>{table(usual)}</More>}
+  </>;
+}
+
+const withUnit = (value: unknown, unit: string) => written(value) + (unit && /\d/.test(written(value)) ? `\u00a0${unit}` : "");
+
+/** A value of an option, in full. */
+export function written(value: unknown): string {
+  if (Array.isArray(value)) return value.length ? value.map(written).join(", ") : "none";
+  return typeof value === "number" ? number(value, 9) : value === "" ? "none" : shown(value);
 }
 
 /** Width of an element, as it is laid out. */

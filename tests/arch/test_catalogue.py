@@ -22,7 +22,11 @@ CATALOGUE = {
 }
 ROOMS = {file.stem for file in (SOURCE / "messages").glob("*.toml")}
 CODE = re.compile(r"[a-z_]+\.[a-z0-9]+(?:-[a-z0-9]+)*")
-PARTS = {"what", "remedy", *(f"{p}_{w}" for p in ("what", "remedy") for w in ("cli", "file"))}
+PARTS = {
+    "what",
+    "remedy",
+    *(f"{p}_{w}" for p in ("what", "remedy") for w in ("cli", "file", "studio")),
+}
 LOCATION = {"severity", "file", "row", "quantity", "line", "data"}
 #: Entries whose data have a `nearest` of another meaning.
 OWN_NEAREST = {"attitude.hz-asked-hz"}
@@ -64,6 +68,35 @@ def test_every_entry_says_something_in_known_words():
         assert CODE.fullmatch(code), code
         assert entry["what"].strip(), code
         assert set(entry) <= PARTS, code
+
+
+#: Rooms of which a page of the studio shows messages, and those of them that it cannot meet: they
+#: are of writing logs, of simulations, and of what only a command line or a server's start takes.
+OF_STUDIO = {
+    *("alignment", "allan", "attitude", "bundle", "calibrate", "config", "crash", "doctor", "dsp"),
+    *("estimation", "geodesy", "io", "mechanization", "navigation", "prefilter", "sensors"),
+    "tables",
+}
+NEVER_MET = re.compile(
+    r"io\.(written-.*|exists|no-writer-for-ending|stream-of-own-file|crash-json-other-format)"
+    r"|attitude\.(named-twice-trial-does-not|recorded-log-sensor|reference-clock-differs)"
+    r"|bundle\.(no-key-file|no-secret-key|no-public-key|.*-schema|unknown-form)"
+)
+COMMANDS = "doctor|init|navigate|align|attitude|allan|calibrate|convert|crash|sensors|modules|sign"
+OPTION = re.compile(rf"(?<![\w-])--[a-z]|\bstrapdown ({COMMANDS})\b")
+
+
+def test_the_studio_names_no_option_of_the_command_line():
+    """Whoever reads it has a page before him, and no command line."""
+    found = []
+    for code, entry in CATALOGUE.items():
+        if code.partition(".")[0] not in OF_STUDIO or NEVER_MET.fullmatch(code):
+            continue
+        for part in ("what", "remedy"):
+            forms = [part + form for form in (*errors._FORMS["studio"], "") if part + form in entry]
+            if forms and OPTION.search(entry[forms[0]]):
+                found.append((code, forms[0]))
+    assert found == []
 
 
 def test_every_placeholder_has_a_format_that_names_can_have():
@@ -191,7 +224,7 @@ def test_sentences_are_read_only_where_they_are_shown(nodes):
     assert dict(read) == {}
 
 
-@pytest.mark.parametrize("words", ["python", "cli", "file"])
+@pytest.mark.parametrize("words", ["python", "cli", "file", "studio"])
 def test_templates_are_sound(words):
     """Every template can be filled by data of any kind that has its names."""
 

@@ -29,7 +29,8 @@ def test_it_writes_a_case_and_says_what_is_missing(run_cli, record, tmp_path):
     text = out.read_text(encoding="utf-8")
     table = tomllib.loads(text)
     assert table["units"][0]["accelerometers"][0]["path"] == "left.csv"
-    assert "left: one range; struck at" in done.out
+    assert "left: one range; impact at" in done.out
+    assert "delta-V" in done.out and "(change of velocity, no speed)" in done.out
     # 150 m/s² times half of 0.1 s.
     assert "27 km/h" in done.out or "26.9 km/h" in done.out
     for k, line in enumerate(text.splitlines(), 1):

@@ -6,6 +6,8 @@ import contextlib
 import json
 import os
 import pty
+import re
+import shlex
 import socket
 import struct
 import threading
@@ -57,7 +59,7 @@ def shown(run):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", ["", "data"])
-def test_sensor_logger_by_http_push(start, tmp_path, path):
+def test_sensor_logger_by_http_push(start, tmp_path, path, run_cli):
     run = start("--every", "0")
     assert run.said[0]["sources"][0].startswith("http http://127.0.0.1:")
     with Push(run.address + path) as push:
@@ -73,7 +75,14 @@ def test_sensor_logger_by_http_push(start, tmp_path, path):
     told = json.loads((tmp_path / "out" / "phone-1" / "latency.json").read_text())
     assert set(told["stages"]) == {"arrival_to_parsed", "parsed_to_journal", "arrival_to_state"}
     assert (told["messages"], told["not_used"]) == (len(messages(readings(TIME))), {})
-    assert "phone-1" in run.err()
+    # The command of its sealed result; there is no navigation to play at a pace.
+    session = tmp_path / "out" / "phone-1"
+    words = re.findall(r"(?m)report: strapdown (.*)$", run.err())
+    assert [shlex.split(one) for one in words] == [["attitude", str(session)]]
+    done = run_cli("navigate", session, "--pace", "max", "--out", tmp_path / "no")
+    assert done.code == 4 and "computed an attitude" in done.err
+    done = run_cli("attitude", session, "--out", tmp_path / "sealed", "-q")
+    assert done.code == 0, done.err
 
 
 @pytest.mark.slow
@@ -274,6 +283,7 @@ def test_navigation_of_lines_is_that_of_navigate_live_and_of_its_session(start, 
     states = [one for one in run.states() if one.get("lat") is not None]
     assert {"lat", "VN", "roll", "q", "heading_sd", "session"} <= set(states[-1])
     folder = tmp_path / "out" / "127-0-0-1"
+    assert f"strapdown navigate {shlex.quote(str(folder))}" in run.err()
     for source in (folder, folder / "journal"):
         for pace in ((), ("--pace", "max")):
             done = run_cli("navigate", source, "--out", tmp_path / "again", "--force", *pace, "-q")

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from strapdown.errors import ConfigError, DataError
+from strapdown.studio import forms
 from strapdown.studio.configuration import check, command, edited, propose
 from strapdown.studio.forms import form_of, kinds, unit_of
 from strapdown.studio.kinds import KINDS
@@ -456,3 +457,23 @@ def test_units_of_keys():
 
 def test_a_form_is_made_once():
     assert form_of(KINDS["crash"].form) is form_of(KINDS["crash"].form)
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_every_field_of_a_form_says_what_it_is(kind):
+    silent = [
+        field["path"]
+        for section in form_of(KINDS[kind].form)
+        for field in section["fields"]
+        if not field["help"].strip()
+    ]
+    assert silent == []
+
+
+def test_every_help_is_that_of_a_field():
+    """None is left behind when a key is renamed."""
+    known = {f["path"] for kind in KINDS.values() for s in form_of(kind.form) for f in s["fields"]}
+    helps = forms._helps()
+    assert set(helps["path"]) <= known
+    endings = {".".join(path.split(".")[-n:]) for path in known for n in (1, 2)}
+    assert set(helps["name"]) <= endings

@@ -70,8 +70,47 @@ def test_tiles_of_a_map_in_the_folder(fresh):
             assert fresh.ask("GET", f"tiles/{place}").status == 204
 
 
-def test_commands_of_live_runs():
-    words = live_command("walk", "sensor-logger", {"listen": "0.0.0.0:8437", "every": 0.5})
+RUN = """
+[live]
+[sensors]
+sensor = "adis16495-1"
+[start]
+lat_deg = 45.0
+lon_deg = 20.0
+alt_m = 81.2
+roll_deg = 0.0
+pitch_deg = 0.0
+heading_deg = 90.0
+"""
+
+
+def test_a_live_run_navigates_by_a_configuration_of_the_folder(tmp_path):
+    (tmp_path / "run.toml").write_text(RUN, encoding="utf-8")
+    words = live_command(tmp_path, "walk", "udp", {"run": "run.toml"})
+    assert words[:3] == ["live", "run.toml", "--udp=127.0.0.1:5555"]
+    assert live_command(tmp_path, "walk", "udp", {"run": ""})[1].startswith("--udp")
+    (tmp_path / "wrong.toml").write_text("[live]\nhold = 3\n", encoding="utf-8")
+    outside = tmp_path.parent / "sensor.toml"
+    outside.write_text("", encoding="utf-8")
+    leads_out = RUN.replace('"adis16495-1"', f'"{outside.as_posix()}"')
+    (tmp_path / "out.toml").write_text(leads_out, encoding="utf-8")
+    for name in (
+        "missing.toml",
+        "../sensor.toml",
+        "-run.toml",
+        "wrong.toml",
+        "out.toml",
+        "log.csv",
+        3,
+    ):
+        with pytest.raises(ConfigError):
+            live_command(tmp_path, "walk", "udp", {"run": name})
+
+
+def test_commands_of_live_runs(tmp_path):
+    words = live_command(
+        tmp_path, "walk", "sensor-logger", {"listen": "0.0.0.0:8437", "every": 0.5}
+    )
     assert words == [
         *("live", "--listen=0.0.0.0:8437", "--platform=auto", "--every=0.5"),
         *("--lines=json", "--out", "walk"),
@@ -86,11 +125,11 @@ def test_commands_of_live_runs():
         ("sensor-logger", {"platform": "--force"}, "studio.unknown-choice"),
     ):
         with pytest.raises(ConfigError) as caught:
-            live_command("walk", protocol, options)
+            live_command(tmp_path, "walk", protocol, options)
         assert caught.value.finding.code == code, (protocol, options)
     for name, one in PROTOCOLS.items():
         own = {f.flag.removeprefix("--"): f.choices[0] if f.choices else "1" for f in one.fields}
-        made = live_command("walk", name, own)
+        made = live_command(tmp_path, "walk", name, own)
         assert all(word.startswith(("--", "live", "walk")) for word in made)
 
 

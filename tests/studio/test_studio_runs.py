@@ -16,7 +16,10 @@ from urllib.parse import quote
 import numpy as np
 import pytest
 
-from strapdown.bundle import MANIFEST, sha256
+from strapdown.bundle import MANIFEST, sha256, write_bundle, write_json
+from strapdown.errors import Finding
+from strapdown.studio import runs
+from strapdown.studio.folder import Folder
 
 
 def by_command_line(folder: Path, command: str) -> None:
@@ -248,3 +251,50 @@ def test_one_studio_in_a_folder(fresh):
         env={**os.environ, "STRAPDOWN_STUDIO_STATIC": str(fresh.folder.parent / "page")},
     )
     assert done.returncode == 4 and "a studio runs in this folder" in done.stderr
+
+
+def sealed_alignment(folder: Path, heading: float, seconds: float) -> None:
+    """A sealed alignment as a file may have it, with a finding in the words of a command line."""
+    finding = Finding("io.axes-not-stated", file="log.csv").plain("cli")
+    assert "--axes" in finding["remedy"]
+    spec = {"log": {"repair": False}, "coarse": {"duration_s": seconds}}
+    whole = {"name": folder.name, "alignment": spec}
+    with write_bundle(folder, command="align", configuration=whole, inputs=(), seals=[]) as staging:
+        angles = {"roll_deg": 0.1, "pitch_deg": -1e-10, "heading_deg": heading}
+        bounds = {f"{name}_sd_deg": 1.3 for name in ("roll", "pitch", "heading")}
+        write_json(staging / "align.json", {"coarse": {**angles, **bounds}, "findings": [finding]})
+
+
+def test_a_result_is_told_as_people_read_it(tmp_path, monkeypatch):
+    """Numbers as the reports show them, options as a table, findings in the studio's words."""
+    sealed_alignment(tmp_path / "a", 63.798, 60.0)
+    sealed_alignment(tmp_path / "b", 71.5, 90.0)
+    found = runs.run(tmp_path, "a")
+    (finding,) = found["findings"]
+    assert finding["code"] == "io.axes-not-stated" and "--" not in finding["remedy"]
+    by_label = {one["label"]: one for one in found["numbers"]}
+    assert by_label["heading"]["value"] == "63.8" and by_label["heading"]["unit"] == "deg"
+    assert by_label["heading"]["bound"].replace("\u00a0", " ") == "± 2.5"
+    assert by_label["pitch"]["value"] == "0.0"
+    by_key = {one["key"]: one for one in found["options"]}
+    duration = by_key["coarse.duration_s"]
+    assert (duration["value"], duration["unit"], duration["default"]) == (60.0, "s", None)
+    assert duration["help"] and not duration["usual"]
+    assert by_key["log.repair"]["usual"] and by_key["log.repair"]["default"] is False
+    monkeypatch.chdir(tmp_path)
+    Folder(tmp_path).state.mkdir(exist_ok=True)
+    both = runs.compare(tmp_path, ["a", "b"])
+    assert [row["key"] for row in both["options"]] == ["coarse.duration_s"]
+    assert [one["key"] for one in both["same_options"]] == ["log.repair"]
+    (heading,) = [row for row in both["numbers"] if row["quantity"] == "heading"]
+    assert heading["shown"]["values"] == ["63.8", "71.5"] and not heading["detail"]
+    assert heading["shown"]["differences"][1] == "+7.7" and heading["within"][1] is False
+
+
+def test_a_finding_that_is_not_known_is_in_the_words_of_its_result():
+    for code in ("io.of-a-later-version", "../../x.y", "nothing", 3):
+        told = runs._finding({"code": code, "data": {}, "sentence": "as it was", "remedy": "do"})
+        assert (told["text"], told["remedy"]) == ("as it was", "do")
+    # Data of another form.
+    wrong = {"code": "io.time-counter-wraps", "data": 3, "sentence": "as it was", "remedy": None}
+    assert runs._finding(wrong)["text"] == "as it was"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -182,7 +183,7 @@ def live(
         stop_after,
     )
     if not quiet:
-        _print_sessions(hub)
+        _print_sessions(hub, "attitude" if spec is None else "navigate")
 
 
 def show_qr(address: str) -> None:
@@ -200,8 +201,11 @@ def show_qr(address: str) -> None:
     typer.echo(address, err=True)
 
 
-def _print_sessions(hub: Hub) -> None:
-    """Print the latencies and counts of all sessions to standard error."""
+def _print_sessions(hub: Hub, command: str) -> None:
+    """Print the latencies and counts of all sessions to standard error.
+
+    `command`: makes the sealed result of a session, which is a log.
+    """
     from contextlib import redirect_stdout
 
     from strapdown.cli.console import print_table
@@ -240,3 +244,6 @@ def _print_sessions(hub: Hub) -> None:
                 rows,
             )
             print(f"sessions: {hub.folder}")
+            for told in hub.ended:
+                folder = shlex.quote(str(hub.folder / str(told["session"])))
+                print(f"sealed result, with its report: strapdown {command} {folder}")

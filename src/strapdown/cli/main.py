@@ -24,7 +24,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from strapdown import __version__
 from strapdown.cli.console import RESOURCES, WORDS, logged, tell
-from strapdown.errors import ConfigError, Finding, StrapdownError, printable
+from strapdown.errors import ConfigError, Finding, StrapdownError, Words, printable
 from strapdown.parsers import start_for
 
 _RESEND_S = 0.005
@@ -181,7 +181,7 @@ def run() -> None:
             app()
     except StrapdownError as error:
         finding = _by_option(error.finding, sys.argv[1:])
-        _tell(finding)
+        _tell(error.finding)
         text = "\n  ".join([finding.text(WORDS.get()), *_answers(finding)])
         _fail(text, error.exit_code)
     except OSError as error:
@@ -198,8 +198,9 @@ def run() -> None:
 
 
 def _tell(finding: Finding) -> None:
-    """Tell an error to the program that follows this run."""
-    words, places = WORDS.get(), ("file", "row", "line", "quantity")
+    """Tell an error to the program that follows this run, the studio, in its words."""
+    words: Words = "studio"
+    places = ("file", "row", "line", "quantity")
     where = {key: value for key in places if (value := getattr(finding, key)) is not None}
     said = {"text": finding.sentence(words), "remedy": finding.advice(words)}
     tell({"error": {"code": finding.code, "severity": "error", **where, **said}})

@@ -210,7 +210,8 @@ def navigate(
         return
     refuse_without_live(own_of_live)
     session = None if own or any(value is not None for value in given.values()) else source
-    received = None if session is None else configured_session(session)
+    with_pace = played is not None
+    received = None if session is None else configured_session(session, pace=with_pace)
 
     def compute(report: Progress) -> NavigationRun:
         if received is not None:

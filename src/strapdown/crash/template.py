@@ -489,11 +489,12 @@ def _told(unit: Unit) -> str:
         what = f"its largest impact begins near sample {at:.0f}; it has no clock"
     elif impact.found:
         what = (
-            f"struck at {instant(impact.trigger)} s of its clock, "
-            f"{impact.largest / KMH:.3g} km/h, peak {impact.peak / STANDARD_GRAVITY:.3g} g"
+            f"impact at {instant(impact.trigger)} s of its clock, "
+            f"delta-V {impact.largest / KMH:.3g} km/h (change of velocity, no speed), "
+            f"peak {impact.peak / STANDARD_GRAVITY:.3g} g"
         )
     elif unit.strong_ends.saturated:
-        what = f"struck at {instant(impact.trigger)} s of its clock, beyond the end of its range"
+        what = f"impact at {instant(impact.trigger)} s of its clock, beyond the end of its range"
     else:
         what = (
             f"no crash found: {impact.largest / KMH:.2g} km/h within 150 ms at most, of the 8 that "

@@ -25,6 +25,7 @@ from strapdown.report.document import (
     section,
 )
 from strapdown.report.report_bundle import ReportBundle, finite, with_page
+from strapdown.report.values import about
 from strapdown.rotation import rotation_vector_from_dcm
 from strapdown.sensors.calibration import correlations
 from strapdown.systems.calibrate_run import CalibrateRun, run_calibrate
@@ -189,16 +190,10 @@ def parameter_table(result: CalibrateRun) -> TableBlock | None:
         cells = []
         for name in names:
             k = by_name[name]
-            text = _bounded(factor * float(found.values[k]), 1.96 * factor * float(sd[k]))
+            text = about(factor * float(found.values[k]), 1.96 * factor * float(sd[k]), "")
             cells.append(text + ("" if observed[k] else " ?"))
         rows.append((title, unit, *cells))
     return TableBlock(("Error", "unit", *XYZ), tuple(rows), text=(0, 1), caption=CAPTION)
-
-
-def _bounded(value: float, half: float) -> str:
-    """Value and bound, with two digits of the bound."""
-    digits = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 3
-    return f"{value:.{digits}f} ± {half:.{digits}f}".replace("-", "−")
 
 
 def effect_table(result: CalibrateRun) -> TableBlock | None:
@@ -250,7 +245,7 @@ def field_table(result: CalibrateRun) -> TableBlock | None:
     if mag is None:
         return None
     iron = [
-        _bounded(100.0 * v / mag.field, 100.0 * TWO_SIDED_95 * s / mag.field)
+        about(100.0 * v / mag.field, 100.0 * TWO_SIDED_95 * s / mag.field, "")
         for v, s in zip(mag.hard_iron, mag.hard_iron_sd, strict=True)
     ]
     caption = (
@@ -261,8 +256,7 @@ def field_table(result: CalibrateRun) -> TableBlock | None:
     if np.isfinite(mag.rotation_sd).all():
         turn = rotation_vector_from_dcm(mag.rotation) / DEG
         axes = [
-            f"{v:.2f} ± {TWO_SIDED_95 * s / DEG:.2g}".replace("-", "−")
-            for v, s in zip(turn, mag.rotation_sd, strict=True)
+            about(v, TWO_SIDED_95 * s / DEG, "") for v, s in zip(turn, mag.rotation_sd, strict=True)
         ]
         rows.append(("axes against accelerometers", "deg", *axes))
     return TableBlock(("Magnetometer", "unit", *XYZ), tuple(rows), text=(0, 1), caption=caption)

@@ -65,7 +65,14 @@ from strapdown.units import SHOWN_UNITS
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = ["COMPARE", "NumberRow", "RunComparison", "compare_results", "comparison_json"]
+__all__ = [
+    "COMPARE",
+    "NumberRow",
+    "RunComparison",
+    "compare_results",
+    "comparison_json",
+    "units_of",
+]
 
 #: Instants that differ by less are the same, s.
 SAME_INSTANT = 1e-6
@@ -186,10 +193,7 @@ class RunComparison:
     @property
     def units(self) -> str | None:
         """System of units in which crashes are shown, that of the first; None of other runs."""
-        if self.runs[0].command != "crash" or not self.same_command:
-            return None
-        found = self.runs[0].parts[0].answer.get("units")
-        return found if found in SHOWN_UNITS else "metric"
+        return units_of(self.runs[0]) if self.same_command else None
 
     @property
     def summary(self) -> str:
@@ -452,6 +456,14 @@ def compared(runs: Sequence[SealedRun]) -> RunComparison:
 
 def _is_record(row: InputRow) -> bool:
     return row.role.rpartition(": ")[2] == "log"
+
+
+def units_of(run: SealedRun) -> str | None:
+    """System of units in which a crash is shown; None of other runs."""
+    if run.command != "crash":
+        return None
+    found = run.parts[0].answer.get("units")
+    return found if found in SHOWN_UNITS else "metric"
 
 
 def _same_record(options: Sequence[OptionRow], inputs: Sequence[InputRow]) -> bool:

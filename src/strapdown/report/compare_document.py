@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from strapdown import __version__
 from strapdown.config.toml_file import shown
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.ellipsoids import WGS84
 from strapdown.report.compare_charts import charts, in_units, quantity_words
 from strapdown.report.compare_numbers import Value
 from strapdown.report.compare_tracks import QUANTITIES
@@ -28,8 +29,10 @@ from strapdown.report.document import (
 from strapdown.report.values import (
     GAP,
     MINUS,
+    bounded,
     decimals,
     duration_words,
+    half_words,
     instant,
     length_words,
     plain,
@@ -46,6 +49,10 @@ SAME, NONE = "same", "–"
 SAME_PLACE = 1e-9
 #: Decimals of a latitude or longitude, deg: a centimeter.
 PLACES = 7
+#: Of a great circle.
+METRES_PER_DEG = math.radians(WGS84.semi_major_axis)
+#: What a computation in double precision leaves of zero, in any unit that is shown.
+ROUNDING = 1e-9
 METHOD = (
     "Options are those of the sealed configurations, which have every default: a default that one "
     "of them states is no difference. Inputs are compared by their SHA-256.",
@@ -213,7 +220,7 @@ def _figures(result: RunComparison) -> Iterator[KeyFigure]:
                 continue
             factor, unit = _scale(row, result.units)
             half = (
-                "" if row.combined[1] is None else f"{plain_bound(factor * row.combined[1])} {unit}"
+                "" if row.combined[1] is None else f"{half_words(factor * row.combined[1])} {unit}"
             )
             words = {True: "within ± ", False: "outside ± ", None: ""}[row.within[1]]
             yield KeyFigure(
@@ -321,6 +328,37 @@ def numbers_block(
     return TableBlock(tuple(columns), tuple(rows), (0,), caption, tuple(strong))
 
 
+def shown_row(row: NumberRow, system: str | None) -> dict[str, Any]:
+    """Return a row as texts, for a page that lays it out itself.
+
+    Parameters
+    ----------
+    system : str or None
+        Of units, of a crash.
+
+    Returns
+    -------
+    dict
+        ``unit``; ``bound_unit``, that of bounds and differences; of each run ``values``, ``bounds``
+        (empty without one), ``differences`` from the first (empty where there is none) and
+        ``combined``, the bound of this difference.
+    """
+    factor, unit = _scale(row, system)
+    places = _places(row, factor)
+    pairs = [("–", "") if v is None else shown_value(v, factor, places) for v in row.values]
+    on_ground = row.any.kind in ("lat", "lon")
+    return {
+        "unit": "" if on_ground else unit,
+        "bound_unit": "m" if on_ground else unit,
+        "values": [said for said, _ in pairs],
+        "bounds": [bound for _, bound in pairs],
+        "differences": ["", *(_apart(row, k, factor) for k in range(1, len(row.values)))],
+        "combined": [
+            "" if half is None else f"±{GAP}{half_words(factor * half)}" for half in row.combined
+        ],
+    }
+
+
 def _cells(row: NumberRow, result: RunComparison, two: bool) -> Iterator[str]:
     factor, unit = _scale(row, result.units)
     label = row.any.label
@@ -339,7 +377,7 @@ def _cells(row: NumberRow, result: RunComparison, two: bool) -> Iterator[str]:
         else:
             word = "within" if row.within[1] else "outside"
             metres = f"{GAP}m" if row.any.kind in ("lat", "lon") else ""
-            yield f"{word} ± {plain_bound(factor * half)}{metres}"
+            yield f"{word} ± {half_words(factor * half)}{metres}"
 
 
 def _in_brackets(row: NumberRow, k: int, factor: float) -> str:
@@ -352,6 +390,13 @@ def _in_brackets(row: NumberRow, k: int, factor: float) -> str:
 
 
 def _difference(row: NumberRow, k: int, factor: float) -> str:
+    said = _apart(row, k, factor)
+    metres = f"{GAP}m" if row.any.kind in ("lat", "lon") and row.differences[k] else ""
+    return f"{said}{metres}"
+
+
+def _apart(row: NumberRow, k: int, factor: float) -> str:
+    """The difference of a run from the first, without unit."""
     first, other, apart = row.values[0], row.values[k], row.differences[k]
     if first is None or other is None:
         return ""
@@ -361,45 +406,53 @@ def _difference(row: NumberRow, k: int, factor: float) -> str:
         if other.at is not None and first.at is not None and other.at != first.at:
             return "other instant"
         return ""
+    half = row.combined[k]
+    if half is not None and math.isfinite(half) and half > 0.0 and apart != 0.0:
+        said, _ = bounded(factor * apart, factor * half)
+        signed = row.any.kind != "horizontal" and said.strip("0.") and not said.startswith(MINUS)
+        return f"+{said}" if signed else said
     if row.any.kind == "horizontal":
         return plain(apart, decimals(apart, 2)) if apart else SAME
     if apart == 0.0:
         return SAME
-    metres = f"{GAP}m" if row.any.kind in ("lat", "lon") else ""
-    return f"{_signed(factor * apart)}{metres}"
+    return _signed(factor * apart)
 
 
 def _value(value: Value | None, factor: float, places: int) -> str:
     if value is None:
         return NONE
+    said, bound = shown_value(value, factor, places)
+    if not bound:
+        return said
+    ground = f"{GAP}m" if value.kind in ("lat", "lon") else ""
+    return f"{said} {bound}{ground}" if said else f"{bound}{ground}"
+
+
+def shown_value(value: Value, factor: float, places: int) -> tuple[str, str]:
+    """Format a value and its bound, as `bounded`; `places`: decimals of one without a bound.
+
+    The bound of a latitude or a longitude is in m along the ground, the others in the unit of the
+    value times `factor`. Empty: the value of a quantity that has a bound alone; a bound that there
+    is not.
+    """
     if isinstance(value.value, str):
-        return value.value
-    if value.kind in ("lat", "lon"):
-        assert value.value is not None
-        half = "" if value.below is None else f" ± {plain_bound(value.below)}{GAP}m"
-        return f"{plain(value.value, PLACES)}°{half}"
+        return value.value, ""
+    below, above = value.below, value.above
     if value.value is None:
-        return "" if value.below is None else f"± {plain_bound(value.below)}"
-    shown_value = factor * value.value
-    if value.kind == "count" or (value.below is None and _is_whole(shown_value)):
-        return plain(shown_value, 0)
-    if value.below is None and abs(shown_value) < 0.5 * 10.0**-places:
-        return _tiny(shown_value)
-    text = plain(shown_value, places)
-    return text + _bound(value, factor, places)
-
-
-def _bound(value: Value, factor: float, places: int) -> str:
-    if value.below is None or value.above is None:
-        return ""
-    low, high = factor * value.below, factor * value.above
-    if math.isinf(low) and math.isinf(high):
-        return ""
-    if math.isclose(low, high, rel_tol=0.02):
-        return f" ± {plain_bound(low)}"
-    ends = ("∞" if math.isinf(x) else plain_bound(x) for x in (high, low))
-    up, down = ends
-    return f" +{up} {MINUS}{down}"
+        return "", "" if below is None else f"±{GAP}{half_words(factor * below)}"
+    if value.kind in ("lat", "lon"):
+        if below is None:
+            return f"{plain(value.value, PLACES)}°", ""
+        finest = decimals(below / METRES_PER_DEG, 2, least=2, most=PLACES + 2)
+        return f"{plain(value.value, finest)}°", f"±{GAP}{half_words(below)}"
+    shown = factor * value.value
+    if below is not None and above is not None and not math.isinf(min(below, above)):
+        return bounded(shown, factor * below, factor * above)
+    if value.kind == "count" or _is_whole(shown):
+        return plain(shown, 0), ""
+    if abs(shown) < 0.5 * 10.0**-places:
+        return (_tiny(shown) if abs(shown) > ROUNDING else "0"), ""
+    return plain(shown, places), ""
 
 
 def _is_whole(value: float) -> bool:
@@ -444,13 +497,6 @@ def _places(row: NumberRow, factor: float) -> int:
     apart = [factor * abs(d) for d in row.differences if d]
     least = decimals(max(values), 4, most=6) if values else 2
     return max(least, decimals(min(apart), 2, most=6)) if apart else least
-
-
-def plain_bound(half: float) -> str:
-    """Format a half width to two digits."""
-    if half and half < 1e-6:
-        return _tiny(half)
-    return plain(half, decimals(half, 2, most=7))
 
 
 def _signed(value: float) -> str:
@@ -498,7 +544,7 @@ def scores_block(result: RunComparison) -> TableBlock | None:
                     SAME if same else _digits(factor * score.rms),
                     SAME if same else _digits(factor * score.largest),
                     "" if same else where,
-                    NONE if score.bound is None else plain_bound(factor * score.bound),
+                    NONE if score.bound is None else half_words(factor * score.bound),
                     NONE if score.share is None else share_words(score.share),
                 )
             )

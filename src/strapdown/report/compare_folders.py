@@ -34,6 +34,7 @@ __all__ = [
     "open_part",
     "open_run",
     "option_rows",
+    "options_of",
     "seconds",
     "shown_names",
 ]
@@ -225,7 +226,7 @@ def option_rows(runs: Sequence[SealedRun]) -> tuple[tuple[OptionRow, ...], int]:
     a catalogue is compared by its digest. Of runs of different commands, the options that all of
     them have.
     """
-    every = [_options(run) for run in runs]
+    every = [options_of(run) for run in runs]
     several = len({run.command for run in runs}) > 1
     if several:
         every = [{k.removeprefix(f"{RUN}."): v for k, v in one.items()} for one in every]
@@ -249,6 +250,9 @@ class _File:
     name: str
     digest: str
 
+    def __str__(self) -> str:
+        return self.name
+
 
 def _same(one: Any, other: Any) -> bool:
     if isinstance(one, _File) and isinstance(other, _File):
@@ -261,8 +265,12 @@ def _file_name(value: Any) -> Any:
     return f"{value.name} (sha256 {value.digest[:DIGITS]}…)" if isinstance(value, _File) else value
 
 
-def _options(run: SealedRun) -> dict[str, Any]:
-    """Every option of a run by its key, without paths of inputs and the name of the folder."""
+def options_of(run: SealedRun) -> dict[str, Any]:
+    """Return every option of a run by its key, without paths of inputs and the name of the folder.
+
+    Keys are dotted, with the name or the number of a table of a list in brackets; a file that
+    stands for a name of a catalogue, such as that of a sensor, has its name as text.
+    """
     found: dict[str, Any] = {}
     for part in run.parts:
         whole = part.manifest["configuration"]

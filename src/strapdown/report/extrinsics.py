@@ -25,6 +25,7 @@ from strapdown.report.document import (
     section,
 )
 from strapdown.report.report_bundle import ReportBundle, finite, with_page
+from strapdown.report.values import bounded
 from strapdown.systems.extrinsics_run import ExtrinsicsRun, run_extrinsics
 from strapdown.tables.checks import index_of
 
@@ -253,10 +254,9 @@ def _seen(observed: bool) -> str:
 
 
 def _value(value: float, bound: float, factor: float) -> tuple[str, str]:
-    """Value and bound, with two digits of the bound."""
-    value, bound = factor * value, factor * bound
-    places = int(np.clip(1 - np.floor(np.log10(max(bound, 1e-9))), 0, 6))
-    return f"{value:.{places}f}".replace("-", "−"), f"{bound:.{places}f}"
+    """Value and bound."""
+    said, half = bounded(factor * value, factor * bound)
+    return said, half.removeprefix("±").strip() or "–"
 
 
 def extrinsics_document(result: ExtrinsicsRun, name: str = "") -> Document:

@@ -41,6 +41,8 @@ MINUS = "\u2212"
 GAP = "\u00a0"
 # Significant digits of a bound; its value is rounded to the same decimal.
 DIGITS = 2
+# Decimals of a value at most.
+MOST = 6
 #: Instead of the bound of a quantity of which the error model has no state.
 NOT_ESTIMATED = "not estimated"
 
@@ -65,7 +67,9 @@ def decimals(size: float, digits: int = 3, *, least: int = 0, most: int = 6) -> 
     """Return the decimals with which a size has so many digits; two for a size without digits."""
     if not (math.isfinite(size) and size > 0.0):
         return 2
-    return min(most, max(least, digits - 1 - math.floor(math.log10(size))))
+    # Of the rounded size: 0.996 to two digits is 1.0, not 1.00.
+    exponent = int(f"{size:.{digits - 1}e}".rpartition("e")[2])
+    return min(most, max(least, digits - 1 - exponent))
 
 
 def about(value: float, half: float, unit: str) -> str:
@@ -79,16 +83,57 @@ def about(value: float, half: float, unit: str) -> str:
     Returns
     -------
     str
-        As ``7.34 ± 0.27 m/s``, with no-break spaces.
+        As ``7.34 ± 0.27 m/s``, with no-break spaces: `bounded`.
     """
-    places = decimals(half, DIGITS, most=4)
-    both = f"{plain(value, places)}{GAP}±{GAP}{plain(half, places)}"
-    return both + (unit if unit == "°" else GAP + unit if unit else "")
+    said, bound = bounded(value, half)
+    if not bound:
+        said, bound = plain(value, 2), f"±{GAP}–"
+    return f"{said}{GAP}{bound}" + (unit if unit == "°" else GAP + unit if unit else "")
+
+
+def bounded(value: float, below: float, above: float | None = None) -> tuple[str, str]:
+    """Format a value and its bound, all to two digits of the bound: the one way for both.
+
+    Parameters
+    ----------
+    value : float
+    below, above : float
+        Half widths of the bound, in the unit of the value; `above` is `below` if not given, and
+        infinite ends are open.
+
+    Returns
+    -------
+    tuple of str
+        ``("63.8", "± 2.5")``; ``("0.0000", "± 0.0031")``; ``("63.8", "+∞ −2.5")``; the bound is
+        empty if both ends are open, and the value then to four digits.
+    """
+    above = below if above is None else above
+    ends = [half for half in (below, above) if math.isfinite(half)]
+    if not ends:
+        return plain(value, decimals(abs(value), 4)), ""
+    least = min((half for half in ends if half > 0.0), default=0.0)
+    said = _rounded(value, decimals(least, DIGITS, least=-MOST, most=MOST))
+    if len(ends) == 2 and math.isclose(below, above, rel_tol=0.02):
+        return said, f"±{GAP}{half_words(below)}"
+    up, down = ("∞" if math.isinf(half) else half_words(half) for half in (above, below))
+    return said, f"+{up} {MINUS}{down}"
+
+
+def half_words(half: float) -> str:
+    """Format a half width of a bound to two digits."""
+    if 0.0 < half < 0.1**MOST:
+        return f"{half:.1e}".replace("-", MINUS)
+    return _rounded(half, decimals(half, DIGITS, least=-MOST, most=MOST + 1))
+
+
+def _rounded(value: float, places: int) -> str:
+    """Format a number rounded to decimals, or to tens, hundreds … where these are negative."""
+    return plain(round(value, places) if places < 0 else value, max(places, 0))
 
 
 def heading_shown(deg: float, half: float) -> float:
     """Return a heading, deg, from 0 to below 360 as `about` shows it: 359.9 ± 16 is 0 ± 16."""
-    return round(deg, decimals(half, DIGITS, most=4)) % 360.0
+    return round(deg, decimals(half, DIGITS, most=MOST)) % 360.0
 
 
 def plus_minus(half: float, unit: str) -> str:
@@ -170,7 +215,7 @@ def speed_both(value: float) -> str:
 def speed_range(value: float, half: float) -> str:
     """Format the bound of a speed in m/s as a range, and the speed in the unit beside."""
     factor, beside = speed_factor(), SHOWN.get().beside
-    places = decimals(factor * half, DIGITS, most=4)
+    places = decimals(factor * half, DIGITS, most=MOST)
     low, high = factor * (value - half), factor * (value + half)
     ends = f"{plain(low, places)} to {plain(high, places)}{GAP}{speed_unit()} with 95{GAP}%"
     other = speed_factor(beside)
@@ -184,7 +229,7 @@ def change_words(change: VelocityChange, *, unit: str = "") -> str:
     value, half = scale * change.resultant, scale * change.resultant_bound
     if not change.at_least:
         return about(value, half, unit)
-    places = decimals(half, DIGITS, most=4)
+    places = decimals(half, DIGITS, most=MOST)
     return f"at least{GAP}{plain(value, places)}{GAP}{unit}"
 
 
@@ -193,7 +238,7 @@ def change_range(change: VelocityChange) -> str:
     if not change.at_least:
         return speed_range(change.resultant, change.resultant_bound)
     factor = speed_factor()
-    places = decimals(factor * change.resultant_bound, DIGITS, most=4)
+    places = decimals(factor * change.resultant_bound, DIGITS, most=MOST)
     low = plain(factor * change.resultant_range[0], places)
     return f"above {low}{GAP}{speed_unit()} with 95{GAP}%, without an upper bound"
 

@@ -172,6 +172,8 @@ class CalibrationProblem:
             for one in rotations
             if one.rate is not None
         ]
+        for stretch in rates:
+            _refuse_opposite_sign(stretch)
         if not nodes and not rates:
             logs = [str(one.imu.attrs["source"]) for one in records if one.imu.attrs.get("source")]
             raise DataError("calibrate.no-rest", file=", ".join(logs) or None, quantity="log")
@@ -653,3 +655,23 @@ def _parameters(prior: ImuUncertainty, warm: bool) -> tuple[tuple[str, ...], Arr
 def indices_of(terms: Sequence[str]) -> list[tuple[int, int]]:
     """Row and column of terms such as ``xy``."""
     return [(XYZ.index(t[0]), XYZ.index(t[1])) for t in terms]
+
+
+def _refuse_opposite_sign(stretch: Stretch) -> None:
+    """Refuse a known rate of which the gyro shows the opposite: its scale error would be -200 %."""
+    known = stretch.known
+    if known is None or known.rate is None:
+        return
+    axis = known.axis or 0
+    measured = float(stretch.gyro[:, axis].mean())
+    # Nearer to the rate reversed than to none: no bias of a gyro is half of a rate to calibrate by.
+    if measured * known.rate < 0.0 and abs(measured) > 0.5 * abs(known.rate):
+        raise DataError(
+            "calibrate.turn-sign",
+            quantity="turns",
+            axis="xyz"[axis],
+            stated=known.rate / DEG,
+            measured=measured / DEG,
+            start=known.start,
+            end=known.end,
+        )

@@ -306,9 +306,10 @@ async def submit_live(
     studio: Studio, name: str, protocol: str, options: Mapping[str, Any] | list[Any]
 ) -> Response:
     """Queue a run that receives samples as they come."""
-    words = live_command(name, protocol, options if isinstance(options, dict) else {})
 
     def queued() -> dict[str, Any]:
+        given = options if isinstance(options, dict) else {}
+        words = live_command(studio.folder.path, name, protocol, given)
         refuse_taken(studio, name, words)
         return studio.jobs.submit("live", name, words)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import types
 from collections.abc import Iterable, Iterator
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -39,6 +40,12 @@ SHOWN = {
     "_n_per_m": "N/m",
     "_kg": "kg",
     "_deg_per_s": "deg/s",
+    "_deg_per_h": "deg/h",
+    "_ug": "µg",
+    "_mg": "mg",
+    "_ut": "µT",
+    "_db": "dB",
+    "_mb": "MB",
     "_deg": "deg",
     "_hz": "Hz",
     "_percent": "%",
@@ -172,8 +179,25 @@ def _field(name: str, info: FieldInfo, path: tuple[str, ...]) -> dict[str, Any]:
         "choices": choices,
         "default": default,
         "required": info.is_required(),
-        "help": info.description or "",
+        "help": info.description or _help(path),
     }
+
+
+@cache
+def _helps() -> dict[str, dict[str, str]]:
+    import tomllib
+
+    text = files("strapdown.studio").joinpath("help.toml").read_text(encoding="utf-8")
+    found: dict[str, dict[str, str]] = tomllib.loads(text)
+    return found
+
+
+def _help(path: tuple[str, ...]) -> str:
+    """What a field without a description of its own is: by its path, else by its name."""
+    by = _helps()
+    whole = ".".join(path)
+    named = (by["name"].get(".".join(path[-n:])) for n in (2, 1))
+    return by["path"].get(whole) or next((text for text in named if text), "")
 
 
 def _kind(hint: Any) -> tuple[str, list[Any]]:
@@ -198,5 +222,5 @@ def _kind(hint: Any) -> tuple[str, list[Any]]:
 
 def _label(name: str) -> str:
     """Name of a key in words, without its unit."""
-    words = name.removesuffix(_ending(name, (*UNITS, "_percent"))) if unit_of(name) else name
+    words = name.removesuffix(_ending(name, (*UNITS, *SHOWN))) if unit_of(name) else name
     return words.replace("_", " ").capitalize().replace("gnss", "GNSS").replace("Gnss", "GNSS")

@@ -192,7 +192,7 @@ def said(code: str) -> dict[str, Any]:
     from strapdown.errors import Finding
 
     one = Finding(code, severity="error")
-    return {"code": code, "text": one.sentence("file"), "remedy": one.advice("file")}
+    return {"code": code, "text": one.sentence("studio"), "remedy": one.advice("studio")}
 
 
 def _with_headers(send: Send) -> Send:

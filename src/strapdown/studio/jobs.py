@@ -303,7 +303,7 @@ class Jobs:
         address = said["address"][:300]
         open_ = None
         if said.get("loopback") is not True:
-            open_ = Finding("studio.live-open").sentence("file")
+            open_ = Finding("studio.live-open").sentence("studio")
         return {"address": address, "qr": address, "token": None, "warning": open_}
 
     def _tail(self, job: Job) -> list[str]:

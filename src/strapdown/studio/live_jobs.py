@@ -5,9 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from strapdown.config.navigation import NavigationSpec
+from strapdown.config.toml_file import read_toml
 from strapdown.errors import ConfigError, Finding, check_choice, printable
+from strapdown.studio.configuration import refuse_outside
+from strapdown.studio.folder import Folder
 
 __all__ = ["PROTOCOLS", "live_command", "live_info"]
 
@@ -48,6 +53,8 @@ _END = LiveField(
     "--stop-after", "End after", "otherwise it ends when it is stopped", "", "number", (), "s"
 )
 
+#: Key of the configuration of a navigation, beside the fields of every protocol.
+RUN = "run"
 PROTOCOLS = {
     "sensor-logger": Protocol(
         "Sensor Logger",
@@ -116,21 +123,39 @@ def live_info() -> dict[str, Any]:
             }
             for name, one in PROTOCOLS.items()
         ],
-        "warning": Finding("studio.live-open").sentence("file"),
+        "warning": Finding("studio.live-open").sentence("studio"),
     }
 
 
-def live_command(name: str, protocol: str, options: Mapping[str, Any]) -> list[str]:
+def live_command(folder: Path, name: str, protocol: str, options: Mapping[str, Any]) -> list[str]:
     """Return the command of a live run, as words after ``strapdown``.
 
-    ConfigError: the protocol or an option of it is not known, or its value is none.
+    Parameters
+    ----------
+    folder : Path
+        Of the studio.
+    name : str
+        Of the folder of the sessions.
+    protocol : str
+        Of `PROTOCOLS`.
+    options : mapping
+        Values by the names of its fields, and ``run``: a file of the folder, the configuration of a
+        navigation, without which an attitude is computed.
+
+    Raises
+    ------
+    ConfigError
+        The protocol or an option of it is not known, or its value is none; the configuration is
+        wrong, or names a file outside of the folder.
     """
     check_choice("studio.unknown-protocol", PROTOCOLS, quantity="protocol", word=protocol)
     fields = {one.flag.removeprefix("--"): one for one in PROTOCOLS[protocol].fields}
     words = ["live"]
     for key in options:
-        if key not in fields:
-            raise ConfigError("studio.unknown-key", word=str(key)[:80], known=list(fields))
+        if key not in fields and key != RUN:
+            raise ConfigError("studio.unknown-key", word=str(key)[:80], known=[*fields, RUN])
+    if options.get(RUN) not in (None, ""):
+        words.append(_configuration(Folder(folder), options[RUN]))
     for key, field in fields.items():
         value = options.get(key)
         if value in (None, ""):
@@ -141,6 +166,16 @@ def live_command(name: str, protocol: str, options: Mapping[str, Any]) -> list[s
             raise ConfigError("studio.wrong-type", quantity=key, wanted=field.label)
         words.append(f"{field.flag}={_text(key, value, field)}")
     return [*words, "--lines=json", "--out", name]
+
+
+def _configuration(folder: Folder, name: Any) -> str:
+    """Return the configuration of a navigation as a word of a command, once it is checked."""
+    if not isinstance(name, str) or not name.lower().endswith(".toml"):
+        raise ConfigError("studio.wrong-type", quantity=RUN, wanted="name of a .toml file")
+    file = read_toml(folder.file(name))
+    refuse_outside(folder, file)
+    NavigationSpec.of_file(file)
+    return name
 
 
 def _text(key: str, value: Any, field: LiveField) -> str:

@@ -188,8 +188,8 @@ def _question(
 ) -> dict[str, Any]:
     return {
         "code": finding.code,
-        "text": finding.sentence("file"),
-        "remedy": finding.advice("file"),
+        "text": finding.sentence("studio"),
+        "remedy": finding.advice("studio"),
         "file": file,
         "key": key,
         "choices": choices,

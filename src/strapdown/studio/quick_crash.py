@@ -25,7 +25,7 @@ from strapdown.dsp.chi_square import plane_bound
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.report.crash_outline import vehicle_outline
-from strapdown.report.values import has_heading
+from strapdown.report.values import change_words, has_heading, shown_in
 from strapdown.studio.configuration import checked
 from strapdown.studio.kinds import KINDS
 from strapdown.studio.reading_process import told
@@ -53,10 +53,11 @@ def quick(folder: Path, toml: str, changes: Mapping[str, Any], unit: int = 0) ->
     Returns
     -------
     dict
-        ``delta_v`` (value and bound, m/s; None without an event), ``pdof`` (deg, and the hour of
-        the clock), ``path`` with the longer half axis of the ellipse of each point, m;
-        ``over_ground``: whether a heading is known; without one ``north`` is forward of the vehicle
-        at the entry, and ``east`` its right. ``vehicle``, ``recorder``, and ``ms`` that it took.
+        ``delta_v`` (value and bound, m/s, and both as the report shows them; None without an
+        event), ``pdof`` (deg, and the hour of the clock), ``path`` with the longer half axis of the
+        ellipse of each point, m; ``over_ground``: whether a heading is known; without one ``north``
+        is forward of the vehicle at the entry, and ``east`` its right. ``vehicle``, ``recorder``,
+        and ``ms`` that it took.
     """
     begun = time.perf_counter()
     spec = checked(folder, KINDS["crash"], toml, changes=changes)
@@ -69,11 +70,14 @@ def quick(folder: Path, toml: str, changes: Mapping[str, Any], unit: int = 0) ->
     pdof: dict[str, Any] | None = None
     if change is not None:
         at, low, high = direction_bounds(change)
+        with shown_in(spec.options.units):
+            shown = change_words(change)
         delta_v = {
             "value": change.resultant,
             "bound": _number(change.resultant_bound),
             "range": [_number(x) for x in change.resultant_range],
             "at_least": change.at_least,
+            "shown": shown,
             "unit": "m/s",
             "forward": float(change.delta_v.vector[0]),
             "right": float(change.delta_v.vector[1]),

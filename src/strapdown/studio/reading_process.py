@@ -70,7 +70,7 @@ class Refused(Exception):  # noqa: N818
 def told(finding: Finding) -> dict[str, Any]:
     """Return a finding as JSON for the front end: code, severity, place, sentence, remedy."""
     where = {k: v for k in ("file", "row", "line", "quantity") if (v := getattr(finding, k))}
-    said = {"text": finding.sentence("file"), "remedy": finding.advice("file")}
+    said = {"text": finding.sentence("studio"), "remedy": finding.advice("studio")}
     return {"code": finding.code, "severity": finding.severity, **where, **said}
 
 

@@ -17,18 +17,22 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from strapdown import rotation
 from strapdown.bundle import MANIFEST, SIGNATURE_FILE, UNSEALED, read_manifest, sha256
-from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.studio.folder import Folder
+from strapdown.studio.kinds import KINDS
 from strapdown.studio.look import kept_stream
 from strapdown.studio.pyramid import LIST
 from strapdown.tables.checks import index_of
+
+if TYPE_CHECKING:
+    from strapdown.report.compare_folders import SealedRun
 
 __all__ = ["compare", "export", "file_of_run", "run", "run_stream", "summary", "track"]
 
@@ -131,13 +135,15 @@ def run(folder: Path, name: str) -> dict[str, Any]:
     with suppress(StrapdownError):
         listed = json.loads((Path(run_stream(folder, name)) / LIST).read_text(encoding="utf-8"))
         span = {key: listed[key] for key in span}
-    has = {str(one["name"]) for one in manifest["outputs"]}
+    from strapdown.report.compare_folders import open_run
+
+    has, sealed = {str(one["name"]) for one in manifest["outputs"]}, open_run(place, place.name)
     return {
         **summary(folder, name),
         **span,
         "answer": _word(answer, "answer") or _word(answer, "headline"),
-        "numbers": _numbers(place),
-        "options": manifest["configuration"],
+        "numbers": _numbers(sealed),
+        "options": options_table(sealed),
         "inputs": [
             {key: one.get(key) for key in ("role", "name", "kept", "sha256", "bytes")}
             for one in manifest["inputs"]
@@ -174,27 +180,65 @@ def _answer(place: Path, manifest: Mapping[str, Any], most: int | None = None) -
     return {}
 
 
-def _numbers(place: Path) -> list[dict[str, Any]]:
+def _numbers(sealed: SealedRun) -> list[dict[str, Any]]:
     """Return the numbers of a result with their 95 % bounds: those that `compare` compares."""
-    from strapdown.report.compare_folders import open_run
+    from strapdown.report.compare import NumberRow, units_of
+    from strapdown.report.compare_document import shown_row
     from strapdown.report.compare_numbers import values_of
 
-    found = []
-    for part in open_run(place, place.name).parts:
+    found, system = [], units_of(sealed)
+    for part in sealed.parts:
         for one in values_of(part):
+            said = shown_row(NumberRow(one.key, (one,), (None,), (None,)), system)
             found.append(
                 {
                     "group": one.group,
                     "label": one.label,
-                    "value": _finite(one.value),
-                    "unit": one.unit,
+                    "value": said["values"][0],
+                    "bound": said["bounds"][0],
+                    "unit": said["unit"],
                     # A bound of a latitude or a longitude is along the ground.
-                    "bound_unit": "m" if one.kind in ("lat", "lon") else one.unit,
-                    "below": _finite(one.below),
-                    "above": _finite(one.above),
+                    "bound_unit": said["bound_unit"],
                 }
             )
     return found[:MOST]
+
+
+def options_table(sealed: SealedRun) -> list[dict[str, Any]]:
+    """Return the options of a result: key, name, value, unit, default, and what it is.
+
+    ``usual``: whether the value is the default. A default is None where the form of the command
+    states none.
+    """
+    from strapdown.report.compare_folders import options_of
+    from strapdown.studio.forms import form_of, unit_of
+
+    kind = KINDS.get(sealed.command)
+    fields = [] if kind is None else [f for one in form_of(kind.form) for f in one["fields"]]
+    known = {field["path"]: field for field in fields}
+    named = [(re.compile(_any_name(path)), f) for path, f in known.items() if "*" in path]
+    rows = []
+    for key, value in list(options_of(sealed).items())[:MOST]:
+        path = re.sub(r"\[[^\]]*\]", "[]", key)
+        by_name = (field for form, field in named if form.fullmatch(path))
+        field: dict[str, Any] = known.get(path) or next(by_name, {})
+        plain = value if isinstance(value, bool | int | float | str | list) else str(value)
+        rows.append(
+            {
+                "key": key[:200],
+                "label": field.get("label"),
+                "value": _finite(plain),
+                "unit": unit_of(key.rpartition(".")[2]),
+                "default": field.get("default"),
+                "usual": bool(field) and plain == field["default"],
+                "help": field.get("help") or "",
+            }
+        )
+    return rows
+
+
+def _any_name(path: str) -> str:
+    return re.escape(path).replace(r"\*", r"[^.]+")
 
 
 def _finite(value: Any) -> Any:
@@ -202,15 +246,39 @@ def _finite(value: Any) -> Any:
 
 
 def _finding(one: Any) -> dict[str, Any]:
-    """Return a finding of a result as the front end shows findings."""
+    """Return a finding of a result as the front end shows findings, in the words of the studio.
+
+    One that this version does not know, or that has other data, is in those of the result.
+    """
+    said = {"text": _word(one, "sentence") or "", "remedy": _word(one, "remedy")}
+    with suppress(KeyError, ValueError, TypeError, IndexError, AttributeError, OSError):
+        again = _remade(one)
+        said = {"text": again.sentence("studio"), "remedy": again.advice("studio")}
     return {
         "code": _word(one, "code"),
         "severity": _word(one, "severity") or "note",
         "file": _word(one, "file"),
         "quantity": _word(one, "quantity"),
-        "text": _word(one, "sentence") or "",
-        "remedy": _word(one, "remedy"),
+        **said,
     }
+
+
+#: Code of a finding: a room of the catalogue, and what is wrong.
+CODE = re.compile(r"[a-z]+\.[a-z0-9-]+")
+
+
+def _remade(one: dict[str, Any]) -> Finding:
+    """Return a finding of the JSON of a result, with the findings among its data."""
+    if CODE.fullmatch(one["code"]) is None:
+        raise ValueError
+    data = {key: _value(value) for key, value in one["data"].items()}
+    return Finding(one["code"], severity="note", data=data)
+
+
+def _value(node: Any) -> Any:
+    if isinstance(node, dict):
+        return _remade(node)
+    return tuple(map(_value, node)) if isinstance(node, list) else node
 
 
 def _list(node: Any, key: str) -> list[Any]:
@@ -442,6 +510,7 @@ def compare(folder: Path, runs: Sequence[str]) -> dict[str, Any]:
     """Compare results: the JSON of ``strapdown compare``, and the address of its page."""
     from strapdown.api.compare import compare_runs
     from strapdown.report.compare import comparison_json
+    from strapdown.report.compare_document import shown_row
 
     place = Folder(folder)
     digests = [sha256(place.file(name) / MANIFEST) for name in runs]
@@ -454,8 +523,13 @@ def compare(folder: Path, runs: Sequence[str]) -> dict[str, Any]:
         for old in sorted(kept.parent.iterdir(), key=lambda p: p.stat().st_mtime)[: -10 * KEPT]:
             shutil.rmtree(old, ignore_errors=True)
     command = shlex.join(("strapdown", "compare", *runs))
+    told = comparison_json(found)
+    for row, one in zip(told["numbers"], found.numbers, strict=True):
+        row |= {"shown": shown_row(one, found.units), "detail": one.any.detail}
+    other = {row.key for row in found.options}
     return {
-        **comparison_json(found),
+        **told,
+        "same_options": [one for one in options_table(found.runs[0]) if one["key"] not in other],
         "page": f"comparisons/{key}/report.html",
         "command_line": command,
     }

@@ -16,9 +16,15 @@ from strapdown.bundle import MANIFEST, input_files, write_bundle, write_json, wr
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
 from strapdown.formats.writers import write_trajectory
-from strapdown.report.compare_document import compare_document, numbers_block, options_block
+from strapdown.report.compare_document import (
+    compare_document,
+    numbers_block,
+    options_block,
+    shown_row,
+)
 from strapdown.report.compare_tracks import Track, differences
 from strapdown.report.document_html import document_page
+from strapdown.report.values import spaced
 from strapdown.tables import trajectory_table
 
 SPEC = {
@@ -171,6 +177,37 @@ def test_a_difference_has_the_bound_of_independent_errors(tmp_path):
     assert table.loc["end.alt_m", "b difference"] == pytest.approx(11.0)
     assert table.loc["end.alt_m", "a high"] == pytest.approx(150.0 + 1.959964 * 3.0)
     assert not table.loc["end.alt_m", "b within"]
+
+
+def test_a_row_is_shown_with_the_digits_of_its_bounds(tmp_path):
+    """What the page of the studio and that of the comparison show alike."""
+    first, other = state(sd=3.0, roll=-1.28e-10), state(lat=55.75001, alt=161.0, sd=4.0, roll=0.5)
+    for name, one in (("a", first), ("b", other)):
+        sealed(tmp_path / name, files={"navigation.json": one})
+    result = sd.compare_runs(tmp_path / "a", tmp_path / "b")
+
+    def shown(key):
+        texts = shown_row(row(result, key), result.units)
+        return {k: [spaced(x) for x in v] if isinstance(v, list) else v for k, v in texts.items()}
+
+    assert shown("end.alt_m") == {
+        "unit": "m",
+        "bound_unit": "m",
+        "values": ["150.0", "161.0"],
+        "bounds": ["± 5.9", "± 7.8"],
+        "differences": ["", "+11.0"],
+        "combined": ["", "± 9.8"],
+    }
+    # Zero to rounding, with its bound.
+    assert (shown("end.roll_deg")["values"], shown("end.roll_deg")["differences"][1]) == (
+        ["0.0", "0.5"],
+        "+0.5",
+    )
+    lat = shown("end.lat_deg")
+    assert (lat["unit"], lat["bound_unit"], lat["bounds"]) == ("", "m", ["± 5.9", "± 7.8"])
+    # A ten-millionth of a degree is a centimeter: a meter has six decimals.
+    assert lat["values"] == ["55.750000°", "55.750010°"]
+    assert shown("end.VN_m_per_s")["differences"][1] == "same"
 
 
 @pytest.mark.parametrize("lon", [37.62, 179.999995])

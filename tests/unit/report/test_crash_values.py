@@ -10,6 +10,7 @@ from strapdown.crash.pdof import AngleInterval
 from strapdown.report.values import (
     about,
     angle_range,
+    bounded,
     heading_shown,
     instant,
     plain,
@@ -48,10 +49,12 @@ def test_a_number_to_so_many_places(value, places, text):
         (7.3412, 0.2689, "7.34 ± 0.27 m"),
         (7.3412, 2.689, "7.3 ± 2.7 m"),
         (7.3412, 26.89, "7 ± 27 m"),
-        (7341.2, 268.9, "7341 ± 269 m"),
+        (7341.2, 268.9, "7340 ± 270 m"),
         (-7.3412, 0.02689, f"{MINUS}7.341 ± 0.027 m"),
-        # Four places at most: a bound that is as small says no more.
-        (1.0, 1e-7, "1.0000 ± 0.0000 m"),
+        # Six places at most; a smaller bound is still no zero.
+        (1.0, 1e-7, f"1.000000 ± 1.0e{MINUS}07 m"),
+        # Zero to rounding, with its bound.
+        (-1.28e-10, 0.0031, "0.0000 ± 0.0031 m"),
         # Nothing is known of a bound: two places.
         (1.23456, 0.0, "1.23 ± 0.00 m"),
         (1.23456, math.inf, "1.23 ± – m"),
@@ -65,9 +68,26 @@ def test_a_value_is_rounded_by_its_bound(value, half, text):
     assert spaced(about(value, half, "m")) == text
 
 
-def test_a_bound_that_rounds_up_has_a_digit_more_and_never_less():
-    assert spaced(about(10.0, 0.0996, "m")) == "10.000 ± 0.100 m"
-    assert spaced(about(10.0, 9.96, "m")) == "10.0 ± 10.0 m"
+def test_a_bound_that_rounds_up_has_two_digits_too():
+    assert spaced(about(10.0, 0.0996, "m")) == "10.00 ± 0.10 m"
+    assert spaced(about(10.0, 9.96, "m")) == "10 ± 10 m"
+
+
+@pytest.mark.parametrize(
+    ("value", "below", "above", "texts"),
+    [
+        (63.798, 2.5, 2.5, ("63.8", "± 2.5")),
+        # Ends that differ by more than their digits show, by the finer one.
+        (86.54, 1.62, 1.48, ("86.5", f"+1.5 {MINUS}1.6")),
+        (63.798, 2.5, math.inf, ("63.8", f"+∞ {MINUS}2.5")),
+        (63.798, math.inf, 0.21, ("63.80", f"+0.21 {MINUS}∞")),
+        (0.12, 0.0, 0.37, ("0.12", f"+0.37 {MINUS}0.00")),
+        # Without a bound: four digits.
+        (63.798, math.inf, math.inf, ("63.80", "")),
+    ],
+)
+def test_a_value_and_a_bound_of_two_ends(value, below, above, texts):
+    assert tuple(spaced(text) for text in bounded(value, below, above)) == texts
 
 
 def test_without_a_unit_nothing_trails():

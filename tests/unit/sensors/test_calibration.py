@@ -236,3 +236,26 @@ def test_a_log_without_samples_for_a_rate():
     with pytest.raises(DataError) as caught:
         calibrate_imu([record_of(imu)], [KnownRotation(rate=1.0, axis=0, start=9.0, end=10.0)])
     assert caught.value.finding.code == "calibrate.empty-stretch"
+
+
+def test_a_known_rate_of_the_opposite_sign_is_refused():
+    """Its scale error would be -200 %; a small rate of either sign is the gyro's own error."""
+    columns = np.zeros((200, 6))
+    columns[:, 2], columns[:, 5] = 0.5, -9.8
+    imu = imu_of_columns(np.arange(200) / 50.0, columns, [*GYRO, *ACCEL])
+
+    def code_of(rate):
+        known = KnownRotation(rate=rate, axis=2, start=0.5, end=3.5)
+        try:
+            calibrate_imu([record_of(imu)], [known])
+        except DataError as error:
+            return error.finding
+        return None
+
+    found = code_of(-0.5)
+    assert found is not None and found.code == "calibrate.turn-sign"
+    assert found.data["axis"] == "z"
+    assert found.data["stated"] == pytest.approx(-found.data["measured"])
+    for rate in (0.5, 0.2, -1.5):
+        other = code_of(rate)
+        assert other is None or other.code != "calibrate.turn-sign", rate
