@@ -15,6 +15,7 @@ from strapdown import rotation
 from strapdown._kernels import earth as kernel
 from strapdown.constants import TWO_SIDED_95
 from strapdown.dsp.chi_square import (
+    chi_square_above,
     chi_square_exceeded,
     chi_square_quantile,
     normal_quantile,
@@ -58,6 +59,7 @@ __all__ = [
     "bounds",
     "compare_with_places",
     "compare_with_truth",
+    "independent_errors",
     "normalised_squares",
     "rows_of_marks",
     "smoother_consistency",
@@ -88,6 +90,8 @@ OWN_VARIANCE = 1e3 * 9 * np.finfo(np.float64).eps
 
 #: Longest time that one instant represents, s, or three usual steps if longer.
 LONGEST = 1.5
+#: Evenly spaced instants over a run at which its errors are compared with each other.
+EVEN = 1024
 
 
 @dataclass(frozen=True)
@@ -104,6 +108,9 @@ class SolutionScore:
     share : float
         Share of the time in which the error is within its bound; NaN for a quantity without a
         variance of its own, as a height that is held.
+    chance : float
+        Probability of errors whose mean normalized square is as large, if the bounds are right: for
+        normal errors that last as long as these do (`independent_errors`). NaN as above.
     """
 
     quantity: str
@@ -113,6 +120,7 @@ class SolutionScore:
     largest_at: float
     bound: float
     share: float
+    chance: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,13 +181,13 @@ class TruthComparison:
         units = (
             dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "deg")
         )
-        found = [self._score(n, u, self.error(n), self.bound(n)) for n, u in units.items()]
+        found = [self._score(n, u, self.error(n), self.bound(n), (n,)) for n, u in units.items()]
         inside = self.table["inside"]
         for k, score in enumerate(found):
             if np.isnan(inside.get(score.quantity, 0.0)):
-                found[k] = replace(score, share=np.nan)
+                found[k] = replace(score, share=np.nan, chance=np.nan)
         size = np.hypot(*(self.error(n) for n in NED[:2]))
-        return self._score("horizontal", "m", size, self._plane(size)), *found
+        return self._score("horizontal", "m", size, self._plane(size), NED[:2]), *found
 
     def score(self, quantity: str) -> SolutionScore:
         """Score of one quantity."""
@@ -200,7 +208,9 @@ class TruthComparison:
     def _weight(self) -> Array:
         return time_shares(self.time)
 
-    def _score(self, name: str, unit: str, error: Array, bound: Array) -> SolutionScore:
+    def _score(
+        self, name: str, unit: str, error: Array, bound: Array, parts: Sequence[str]
+    ) -> SolutionScore:
         worst = int(np.argmax(np.abs(error)))
         return SolutionScore(
             name,
@@ -210,7 +220,51 @@ class TruthComparison:
             float(self.time[worst]),
             float(np.sqrt(self._weight @ np.square(bound))),
             float(min(1.0, self._weight[np.abs(error) <= bound].sum())),
+            self._chance(error, bound, parts),
         )
+
+    def _chance(self, error: Array, bound: Array, parts: Sequence[str]) -> float:
+        """Probability of errors of one or two components that are as large for their bounds."""
+        freedom, sd = len(parts), self.sd[list(parts)].to_numpy(dtype=np.float64)
+        known = np.isfinite(error) & (bound > 0.0) & (sd > 0.0).all(axis=1)
+        if not known.any():
+            return np.nan
+        limit, weight = chi_square_quantile(0.95, freedom), self._weight[known]
+        squares = limit * np.square(error[known] / bound[known])
+        each = self.differences[list(parts)].to_numpy(dtype=np.float64)[known] / sd[known]
+        count = independent_errors(self.time[known], each)
+        mean = float(weight @ squares / weight.sum())
+        return float(chi_square_above(count * mean, count * freedom))
+
+
+def independent_errors(time: Array, errors: Array) -> float:
+    """Return the number of independent errors of equal effect on a mean square, 1 or more.
+
+    Parameters
+    ----------
+    time : ndarray, (n,), s
+        Increasing.
+    errors : ndarray, (n, m)
+        Normalized errors of mean zero, of m components that last equally long.
+
+    Notes
+    -----
+    The mean square of a normal process of the autocorrelation ρ over a time T has the variance
+    2/N of the square of its mean, with 1/N = ∬ ρ(t - s)² dt ds / T²; N is 1 for a constant error.
+    ρ is that of the errors themselves, about zero; the scatter of its square at long lags makes the
+    number too small, by a third for errors that last a third of the time, by three for errors that
+    last a hundredth.
+    """
+    even = np.linspace(time[0], time[-1], EVEN)
+    z = np.column_stack([np.interp(even, time, one) for one in errors.T])
+    # Padded, so that the end does not meet the beginning.
+    spectrum = np.square(np.abs(np.fft.rfft(z, 2 * EVEN, axis=0))).sum(axis=1)
+    products, pairs = np.fft.irfft(spectrum)[:EVEN], EVEN - np.arange(EVEN)
+    if not products[0] > 0.0:
+        return 1.0
+    rho = np.clip(products / pairs * (EVEN / products[0]), -1.0, 1.0)
+    squares = pairs * np.square(rho)
+    return float(EVEN**2 / (2.0 * squares.sum() - squares[0]))
 
 
 def time_shares(time: Array) -> Array:

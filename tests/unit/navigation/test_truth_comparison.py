@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from tests.coded import coded
 
 from strapdown import rotation
 from strapdown.config.navigation import NavigationSpec
+from strapdown.dsp.chi_square import chi_square_above
 from strapdown.errors import DataError
 from strapdown.mechanization import NorthEastDown
 from strapdown.mechanization.mechanization import state_error
@@ -15,6 +17,7 @@ from strapdown.nav_state import NavState
 from strapdown.navigation.truth_comparison import (
     compare_with_places,
     compare_with_truth,
+    independent_errors,
     state_errors,
 )
 from strapdown.simulation.earth_motion import Origin
@@ -116,6 +119,55 @@ def test_a_covariance_of_a_tenth_is_outside(run):
     )
     assert out.inside["all"] < 0.1
     assert out.inside["horizontal"] < 0.5
+
+
+def lasting(rng, count, time):
+    """Normal errors of a first-order process that last for a time, of 1; a constant for inf."""
+    kept = 0.0 if time == 0.0 else np.exp(-1.0 / (count - 1) / time)
+    white = rng.normal(size=count) * np.sqrt(1.0 - kept**2)
+    white[0] = rng.normal()
+    return lfilter([1.0], [1.0, -kept], white)
+
+
+@pytest.mark.parametrize(("time", "least"), [(0.0, 5.0), (0.03, 3.0), (0.3, 1.5), (np.inf, 1.001)])
+def test_the_number_of_independent_errors(time, least):
+    """Against its definition with the process's own autocorrelation; too small by what is said."""
+    rng, count = np.random.default_rng(1), 800
+    lag = np.arange(count)
+    rho = (lag == 0.0) * 1.0 if time == 0.0 else np.exp(-lag / (count - 1) / time)
+    exact = count**2 / (2.0 * ((count - lag) * rho**2).sum() - count)
+    stamps = np.linspace(100.0, 400.0, count)
+    found = [independent_errors(stamps, lasting(rng, count, time)[:, None]) for _ in range(100)]
+    assert exact / least <= np.median(found) <= 1.001 * exact
+
+
+@pytest.mark.parametrize("time", [0.01, 0.3, 1.0, np.inf])
+def test_errors_as_large_by_chance_are_not_rarer_than_said(time):
+    """With right bounds; and bounds of a half are found where errors do not last."""
+    rng, stamps = np.random.default_rng(2), np.linspace(0.0, 60.0, 400)
+    said = {1.0: [], 2.0: []}
+    for _ in range(600):
+        z = lasting(rng, 400, time)
+        for size, chances in said.items():
+            count = independent_errors(stamps, size * z[:, None])
+            chances.append(chi_square_above(count * np.mean(np.square(size * z)), count))
+    # Upper end of the 99 % interval of a share of 0.05 in 600.
+    assert np.mean(np.array(said[1.0]) < 0.05) < 0.074
+    rare = np.mean(np.array(said[2.0]) < 0.01)
+    assert rare > 0.99 if time == 0.01 else rare > 0.15
+
+
+def test_the_chance_of_errors_is_of_their_own_bounds(run):
+    """White errors of the stated covariance, of a tenth of it, and of none."""
+    time, _, P, trajectory = run
+    marks = time[::10]
+    chances = {}
+    for part in (1.0, 0.1):
+        stated = np.broadcast_to(part * P, (len(marks), 9, 9))
+        found = compare_with_truth(trajectory, marks, stated, MOTION)
+        chances[part] = {one.quantity: one.chance for one in found.scores}
+    assert min(chances[1.0].values()) > 0.01
+    assert max(chances[0.1].values()) < 1e-9
 
 
 def test_what_the_run_has_no_state_of_is_left_out(run):

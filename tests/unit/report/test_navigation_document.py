@@ -283,6 +283,18 @@ def test_a_good_run_can_be_trusted():
     assert "100" in found.sentence
 
 
+def test_an_error_that_hardly_changes_is_one_draw():
+    """One that is beyond its bounds for most of the time occurs in a few percent of good runs."""
+    made = record()
+    for north, verdict, code in (
+        (5.0, "trusted", "navigation.error-beside-bound-lasting"),
+        (8.0, "distrusted", "navigation.error-beside-bound"),
+    ):
+        found = told(made, truth=shifted(made.trajectory, north=north))
+        assert found.errors.score("horizontal").share < 0.3
+        assert (trust(found).verdict, trust(found).reasons[0].code) == (verdict, code)
+
+
 def test_a_run_beyond_its_bounds_cannot():
     made = record(outage=None)
     found = told(made, truth=shifted(made.trajectory, north=30.0))
