@@ -66,6 +66,7 @@ __all__ = [
     "handed_over",
     "here_by_fix",
     "motion_by_fixes",
+    "rest_by_fixes",
     "site_of_fixes",
     "unused_fixes",
 ]
@@ -158,16 +159,18 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
         by_others = _by_antenna(chain, state, q_nb, start.v_n, turn)
         return from_alignment(filter_, course, start, P, rest, by_others)
     fixes = _fixes(chain, state)
-    moved = None
+    moved, velocity_sd = None, np.array(chain.velocity_sd)
     if chain.site is None:
         shaken = any(finding.code == SHAKEN for finding in found.alignment.findings)
         clear = DOUBTFUL if shaken else CLEAR
         moved = motion_by_fixes(fixes, state.begun, state.time, clear)
+        if shaken and moved is None:
+            velocity_sd = np.maximum(velocity_sd, rest_by_fixes(fixes, state.begun, state.time))
     if moved is not None:
         return _in_motion(chain, state, found, rest, moved)
     site, sd = _site(chain, state, q_nb)
     start = NavState.from_degrees(site.lat_deg, site.lon_deg, site.alt, time=state.time)
-    P = np.diag(np.square(np.concatenate([sd, chain.velocity_sd])))
+    P = np.diag(np.square(np.concatenate([sd, velocity_sd])))
     by_others = None if chain.site is not None else _by_antenna(chain, state, q_nb, still, still)
     begun = from_alignment(filter_, found.alignment, start, P, rest, by_others)
     if not found.alignment.heading_given:
@@ -645,6 +648,8 @@ DOUBTFUL, SHAKEN = 1.0, "alignment.specific-force-scatters"
 # Speed of a body that is not at rest, m/s; vertical one of a moving body, unmeasured, m/s; number
 # of velocities whose median shows it.
 MOVES, CLIMB, NEWEST = 0.5, 1.0, 3
+#: Standard deviation of a velocity of which nothing is known, m/s.
+UNKNOWN_VELOCITY = 10.0
 
 
 def fixes_until(
@@ -771,32 +776,65 @@ def motion_by_fixes(
     if fixes is None or begin >= time:
         return None
     part = fixes[fixes.index >= begin]
+    told = _velocity_by_fixes(part, time)
+    if told is None:
+        return None
     v, v_sd = values_of(part, VELOCITY_COLUMNS), values_of(part, VELOCITY_SD)
+    by_velocity = usable(part, VELOCITY_SD[:2])
+    if by_velocity.any():
+        rows = np.flatnonzero(by_velocity)[-NEWEST:]
+        speed = float(np.median(np.hypot(v[rows, 0], v[rows, 1])))
+        return told if speed > max(MOVES, clear * float(v_sd[rows[-1], :2].max())) else None
+    far, span, blur = _apart(part)
+    far_enough = np.hypot(far[:, 0], far[:, 1]) > np.maximum(
+        clear * blur[:, :2].max(axis=1), MOVES * span
+    )
+    return told if far_enough.any() else None
+
+
+def rest_by_fixes(fixes: pd.DataFrame | None, begin: float, time: float) -> Array:
+    """Return how well the fixes since an instant show that a receiver does not move, (3,), m/s.
+
+    Standard deviation of its velocity at `time`, north, east, down, where the sensors do not show a
+    rest; at most that of a velocity of which nothing is known, and vertically of a moving body.
+    """
+    told = None
+    if fixes is not None and begin < time:
+        told = _velocity_by_fixes(fixes[fixes.index >= begin], time)
+    unknown = np.array([UNKNOWN_VELOCITY, UNKNOWN_VELOCITY, CLIMB])
+    return unknown if told is None else np.minimum(told[1], unknown)
+
+
+def _velocity_by_fixes(part: pd.DataFrame, time: float) -> tuple[Array, Array] | None:
+    """Velocity and its standard deviation, (3,), m/s; None of fewer than two positions alone."""
     told = usable(part, VELOCITY_SD[:2])
     if told.any():
-        rows = np.flatnonzero(told)[-NEWEST:]
-        k = int(rows[-1])
-        speed = float(np.median(np.hypot(v[rows, 0], v[rows, 1])))
-        if speed <= max(MOVES, clear * float(v_sd[k, :2].max())):
-            return None
-        since = time - float(index_of(part)[k])
-        measured = np.isfinite(v_sd[k])
-        own = np.where(measured, v_sd[k], CLIMB)
-        return np.where(measured, v[k], 0.0), np.hypot(own, MANOEUVRE * since)
-    sd, good = values_of(part, POSITION_SD), usable(part, POSITION_SD)
+        k = int(np.flatnonzero(told)[-1])
+        v, v_sd = values_of(part, VELOCITY_COLUMNS)[k], values_of(part, VELOCITY_SD)[k]
+        since, measured = time - float(index_of(part)[k]), np.isfinite(v_sd)
+        own = np.where(measured, v_sd, CLIMB)
+        return np.where(measured, v, 0.0), np.hypot(own, MANOEUVRE * since)
+    good = usable(part, POSITION_SD)
     if good.sum() < 2:
         return None
-    place, sd, stamps = values_of(part, GEODETIC)[good], sd[good], index_of(part)[good]
-    way = ned_from_geodetic(place, place[-1])
-    far = np.hypot(way[:, 0], way[:, 1])
-    span = np.maximum(stamps[-1] - stamps, INSTANT)
-    blur = np.hypot(sd, sd[-1])
-    if not (far > np.maximum(clear * blur[:, :2].max(axis=1), MOVES * span)).any():
-        return None
+    way, span, blur = _apart(part)
+    since = time - float(index_of(part)[good][-1])
     # Half of the span before the newest fix, the velocity is that of the difference.
-    whole = np.hypot(blur / span[:, None], MANOEUVRE * (0.5 * span + time - stamps[-1])[:, None])
+    whole = np.hypot(blur / span[:, None], MANOEUVRE * (0.5 * span + since)[:, None])
     k = int(np.argmin(whole[:-1, :2].max(axis=1)))
     return -way[k] / span[k], whole[k]
+
+
+def _apart(part: pd.DataFrame) -> tuple[Array, Array, Array]:
+    """Positions of fixes from the newest, m; times before it, s; sd of the differences, m."""
+    good = usable(part, POSITION_SD)
+    place, sd, stamps = (
+        values_of(part, GEODETIC)[good],
+        values_of(part, POSITION_SD)[good],
+        index_of(part)[good],
+    )
+    way = ned_from_geodetic(place, place[-1])
+    return way, np.maximum(stamps[-1] - stamps, INSTANT), np.hypot(sd, sd[-1])
 
 
 def _newest_that_agrees(

@@ -24,6 +24,7 @@ from strapdown.formats import holds
 from strapdown.formats.aid_table import read_aid_table, read_stream
 from strapdown.formats.clocks import on_clock_of
 from strapdown.nav_state import NavState
+from strapdown.navigation.handover import UNKNOWN_VELOCITY
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.modes import KnownStart, Navigation
 from strapdown.navigation.replay import run_batch
@@ -227,7 +228,7 @@ def _open(result: Extrinsics, name: str) -> tuple[Finding, ...]:
 
 #: Standard deviations of the state with which a pass begins: position, m, velocity, m/s, tilt and
 #: heading, deg. All that is known of it comes from the fixes, once.
-UNKNOWN_PLACE, UNKNOWN_VELOCITY, UNKNOWN_TILT, UNKNOWN_HEADING = 100.0, 10.0, 10.0, 60.0
+UNKNOWN_PLACE, UNKNOWN_TILT, UNKNOWN_HEADING = 100.0, 10.0, 60.0
 #: Most passes, and the movement of arm and offset by the last one, in standard deviations.
 PASSES, SETTLED = 12, 0.05
 #: An estimate of a pass is ``assumed - state``: name, state, unit, assumed, and sd before the run.

@@ -8,7 +8,13 @@ from tests import town_drive as town
 
 from strapdown.alignment.levelling import KnownHeading
 from strapdown.frames import place_difference
-from strapdown.navigation.handover import DOUBTFUL, motion_by_fixes
+from strapdown.navigation.handover import (
+    CLIMB,
+    DOUBTFUL,
+    UNKNOWN_VELOCITY,
+    motion_by_fixes,
+    rest_by_fixes,
+)
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.modes import CoarseMode, Navigation, Until
 from strapdown.navigation.navigator import Navigator, with_states
@@ -17,7 +23,7 @@ from strapdown.navigation.replay import run_batch
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation import simulate_imu
-from strapdown.tables import GEODETIC, VELOCITY, VELOCITY_SD
+from strapdown.tables import ACCEL, GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
 SENSORS = ImuUncertainty(
     TriadUncertainty(bias=town.GYRO_BIAS, noise_density=town.GYRO_NOISE),
@@ -84,3 +90,40 @@ def test_a_body_that_shakes_needs_less_proof_of_its_motion():
     assert moving is not None
     # It is no better known than it is measured.
     assert (moving[1] >= 4.0).all()
+
+
+def test_a_body_that_shakes_is_at_rest_only_as_far_as_its_fixes_show_it():
+    """Levelled while it drives at 10 m/s, which fixes of 40 m do not show within two seconds."""
+    aid = Gnss(name="gnss", lever_arm=town.ARM)
+    filter_ = town.begun(aid)[0].filter
+    truth = town.motion().trajectory(np.array([2.0])).iloc[0]
+    modes = (CoarseMode(way=KnownHeading(float(truth["heading"]), 2.0), until=Until(2.0)),)
+    chain = NavigationPipeline(
+        Navigator(with_states(filter_, ()), (aid,)), modes=(*modes, Navigation()), sensors=SENSORS
+    )
+    table = receiver(1.0, velocities=False)
+    table[POSITION_SD] = 40.0
+    assert motion_by_fixes(table.loc[:2.0], 0.0, 2.0, DOUBTFUL) is None
+    imu = samples().copy()
+    imu[ACCEL] += 0.5 * np.sin(4.0 * imu.index.to_numpy())[:, None]
+    record = run_batch(chain, imu, {"gnss": table}).record
+    off = record.trajectory[VELOCITY].iloc[0] - truth[VELOCITY]
+    assert np.abs(off).max() > 5.0
+    sd = record.sd[VELOCITY].iloc[0]
+    assert (np.abs(off) < 1.96 * sd).all()
+
+
+def test_how_well_fixes_show_a_rest():
+    """As a difference of positions does, with an acceleration since; or a velocity."""
+    table = receiver(1.0, velocities=False).loc[:4.0]
+    table[POSITION_SD] = 2.0
+    last = table.index[-1]
+    span = last - table.index[:-1].to_numpy()
+    level = np.hypot(2.0 * np.sqrt(2.0) / span, 0.5 * span + 4.0 - last).min()
+    assert rest_by_fixes(table, 0.0, 4.0) == pytest.approx([level, level, CLIMB])
+    unknown = [UNKNOWN_VELOCITY, UNKNOWN_VELOCITY, CLIMB]
+    assert rest_by_fixes(table.iloc[:1], 0.0, 4.0) == pytest.approx(unknown)
+    assert rest_by_fixes(None, 0.0, 4.0) == pytest.approx(unknown)
+    table[VELOCITY_SD] = 0.2
+    since = np.hypot(0.2, 4.0 - last)
+    assert rest_by_fixes(table, 0.0, 4.0) == pytest.approx([since] * 3)
