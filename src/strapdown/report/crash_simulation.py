@@ -41,9 +41,6 @@ from strapdown.simulation.mounted_motion import ExactAnswers
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of
 
-# Interval in which 49 CFR 563 seeks the delta-V of an event; all pulses here end within it.
-SPAN = 0.15  # s
-
 
 def write_crash_simulation(
     spec: CrashSimulationSpec, out: Path, *, force: bool = False, made: RecordedCase | None = None
@@ -215,18 +212,19 @@ def _impacts(recorded: RecordedCase) -> list[dict[str, Any]]:
     crash = recorded.case.crash
     exact = ExactAnswers(crash.motion, crash.start)
     found = []
-    for begin, change in zip(crash.impacts, crash.delta_v, strict=True):
-        since = begin - crash.start
-        felt = exact.along_body(since, since + SPAN)
-        over_ground = exact.over_ground(since, since + SPAN)
-        angles = _yaw(recorded, since), _yaw(recorded, since + SPAN)
+    for begin, end, change in zip(crash.impacts, crash.ends, crash.delta_v, strict=True):
+        # Over the contact, as it is reconstructed: tires and lean go on changing the velocity.
+        since, until = begin - crash.start, end - crash.start
+        felt = exact.along_body(since, until)
+        over_ground = exact.over_ground(since, until)
+        angles = _yaw(recorded, since), _yaw(recorded, until)
         found.append(
             {
                 "time_s": since,
                 # Of the impact alone, in the vehicle's axes at its start.
                 "delta_v_m_per_s": list(change),
                 "pdof_deg": pdof(change).horizontal_deg,
-                "span_s": SPAN,
+                "span_s": round(until - since, 12),
                 "delta_v_along_turning_axes_m_per_s": felt.tolist(),
                 "delta_v_north_east_down_m_per_s": over_ground.tolist(),
                 "pdof_along_turning_axes_deg": pdof(felt).horizontal_deg,

@@ -345,6 +345,8 @@ class CrashScenario:
         Start of the event on the motion's clock.
     impacts : tuple of float, s
         Start of each impact; empty without a crash.
+    ends : tuple of float, s
+        End of each: the force of the impact is zero from there on, that of tires is not.
     delta_v : tuple of triples, m/s
         Velocity change of the center of mass in each impact: forward, right, down at the vehicle's
         heading when it starts.
@@ -360,6 +362,7 @@ class CrashScenario:
     motion: CrashMotion
     start: float
     impacts: tuple[float, ...] = ()
+    ends: tuple[float, ...] = ()
     delta_v: tuple[Triple, ...] = ()
     kind: Kind | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
@@ -423,10 +426,10 @@ def strike(
     return delta_v
 
 
-# A course lays its pulses and returns the start of the event, the starts of the impacts and their
-# velocity changes.
+# A course lays its pulses and returns the start of the event, and starts, ends and velocity changes
+# of the impacts.
 Parameters = Mapping[str, float]
-Events = tuple[float, tuple[float, ...], tuple[Triple, ...]]
+Events = tuple[float, tuple[float, ...], tuple[float, ...], tuple[Triple, ...]]
 
 
 def _impact(course: CrashCourse, p: Parameters) -> Events:
@@ -450,8 +453,9 @@ def _impact(course: CrashCourse, p: Parameters) -> Events:
     else:
         course.nod(PITCH, p["pitch_deg"])
     delta_v = strike(course, direction, change, arm, p["length"], yaw_gyration)
+    end = course.time
     course.slide(yaw_gyration)
-    return start, (start,), (delta_v,)
+    return start, (start,), (end,), (delta_v,)
 
 
 def _two_impacts(course: CrashCourse, p: Parameters) -> Events:
@@ -459,11 +463,13 @@ def _two_impacts(course: CrashCourse, p: Parameters) -> Events:
     one = course.time
     course.nod(PITCH, -2.0)
     delta_1 = strike(course, -20.0, p["first"], 0.35, 0.110)
+    end_1 = course.time
     course.time += p["between"]
     two = course.time
     delta_2 = strike(course, 130.0, p["second"], -0.3, 0.090)
+    end_2 = course.time
     course.slide(YAW_GYRATION)
-    return one, (one, two), (delta_1, delta_2)
+    return one, (one, two), (end_1, end_2), (delta_1, delta_2)
 
 
 def _rollover(course: CrashCourse, p: Parameters) -> Events:
@@ -481,7 +487,7 @@ def _rollover(course: CrashCourse, p: Parameters) -> Events:
     course.push(0.4, (0.0, 0.0, 2.0 * p["lift"]), delay=0.15)
     course.push(0.08, (0.0, 0.0, -p["lift"]), delay=0.55)
     course.time += 0.15
-    return start, (start,), (delta_v,)
+    return start, (start,), (course.time,), (delta_v,)
 
 
 def _hard_braking(course: CrashCourse, p: Parameters) -> Events:
@@ -496,7 +502,7 @@ def _hard_braking(course: CrashCourse, p: Parameters) -> Events:
     course.lean(PITCH, p["pitch_deg"], 0.4)
     course.brake(p["deceleration"])
     course.lean(PITCH, -p["pitch_deg"], 0.4, delay=-0.2)
-    return start, (), ()
+    return start, (), (), ()
 
 
 def _pothole(course: CrashCourse, p: Parameters) -> Events:
@@ -506,7 +512,7 @@ def _pothole(course: CrashCourse, p: Parameters) -> Events:
     course.push(0.04, (-0.15, 0.0, 0.0), delay=0.05)
     course.shift((0.0, 0.0, -p["depth"]), 0.07, delay=0.06)
     course.time += 0.21
-    return start, (), ()
+    return start, (), (), ()
 
 
 def _kerb(course: CrashCourse, p: Parameters) -> Events:
@@ -523,7 +529,7 @@ def _kerb(course: CrashCourse, p: Parameters) -> Events:
         course.shift((0.0, 0.0, -0.5 * p["height"]), 0.12, delay=delay)
         course.lean(PITCH, sign * tilt, 0.12, delay=delay)
     course.time += wheelbase / speed + 0.12
-    return start, (), ()
+    return start, (), (), ()
 
 
 def _door_slam(course: CrashCourse, p: Parameters) -> Events:
@@ -533,7 +539,7 @@ def _door_slam(course: CrashCourse, p: Parameters) -> Events:
     course.push(0.015, (0.0, p["speed"], 0.0), delay=0.035)
     course.nod(ROLL, p["roll_deg"], 0.05, 0.15)
     course.time += 0.2
-    return start, (), ()
+    return start, (), (), ()
 
 
 _COURSES: dict[str, Callable[[CrashCourse, Parameters], Events]] = {
@@ -580,7 +586,9 @@ def crash_scenario(
     own = {**table["parameters"], **parameters}
     course = CrashCourse(setting or Setting())
     course.approach(own.get("entry_speed", 0.0))
-    start, impacts, delta_v = _COURSES[table.get("course", "impact")](course, {**table, **own})
+    start, impacts, ends, delta_v = _COURSES[table.get("course", "impact")](
+        course, {**table, **own}
+    )
     return CrashScenario(
         name,
         table["summary"],
@@ -588,6 +596,7 @@ def crash_scenario(
         course.motion(),
         start,
         impacts,
+        ends,
         delta_v,
         table.get("kind"),
         own,

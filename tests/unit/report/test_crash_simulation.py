@@ -17,9 +17,15 @@ from crash_case_folder import read_spec, reconstruct, unit
 from strapdown import simulate, verify
 from strapdown.api import simulation as api_simulation
 from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.delta_v_bound import WINDOW_ENDS
+from strapdown.crash.entry import Entry
+from strapdown.crash.reconstruction import reconstruct_crash
 from strapdown.formats import read_raw
+from strapdown.sensors.triad_errors import TriadErrors
+from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.simulation.crash_cases import CASES, record_case
 from strapdown.simulation.crash_motion import CRASHES
+from strapdown.simulation.crash_recording import RecorderDesign, TriadDesign, record_crash
 from strapdown.simulation.mounted_motion import ExactAnswers
 from strapdown.tables import ACCEL, GYRO, NED
 
@@ -154,12 +160,36 @@ def test_the_truth_as_a_file_agrees_with_the_exact_answers(name, folder):
     assert north.iloc[-1] - north.iloc[0] == pytest.approx(moved, abs=1e-6**2 / 12 * 130 + 1e-5)
     assert north.loc[0.0] == 0.0
     assert len(told["impacts"]) == len(crash.impacts)
-    for impact in told["impacts"]:
+    for impact, end in zip(told["impacts"], crash.ends, strict=True):
         at = impact["time_s"]
-        change = truth.loc[round(at + 0.15, 3)] - truth.loc[round(at, 3)]
+        assert at + impact["span_s"] == pytest.approx(end - crash.start, abs=1e-11)
+        # Stamps of 1 ms, on which all contacts end, but for rounding.
+        rows = truth.index.get_indexer([at, at + impact["span_s"]], "nearest", tolerance=1e-9)
+        assert rows.min() >= 0
+        change = truth.iloc[rows[1]] - truth.iloc[rows[0]]
         over_ground = [change[f"{v} [m/s]"] for v in ("VN", "VE", "VD")]
         assert impact["delta_v_north_east_down_m_per_s"] == pytest.approx(over_ground, abs=1e-8)
     assert told["end"]["north_m"] == truth["north [m]"].loc[0.75]
+
+
+@pytest.mark.parametrize("name", ["pole", "side"])
+def test_a_recorder_without_errors_finds_the_told_change_of_velocity(name, folder):
+    """Told and reconstructed over one window: the contact, to within the effect of its ends."""
+    told = json.loads((folder(name) / "scenario.json").read_text(encoding="utf-8"))
+    crash = CRASHES[name]
+    sensors = TriadUncertainty(noise_density=1e-5, bias=1e-6)
+    accel, gyro = (TriadDesign(part, sensors, 1000.0, TriadErrors()) for part in ("accel", "gyro"))
+    unit, _ = record_crash(
+        crash.motion, RecorderDesign("ideal", (accel,), gyro), impact=crash.start, seed=0
+    )
+    speed = crash.parameters["entry_speed"]
+    event = reconstruct_crash([unit], Entry.from_speed(speed, 0.01)).main.body[0].event
+    ends = event.bound.by_contributor.loc[WINDOW_ENDS, ["xx", "yy", "zz"]].to_numpy() ** 0.5
+    (impact,) = told["impacts"]
+    off = event.delta_v.vector - impact["delta_v_along_turning_axes_m_per_s"]
+    along = np.argmax(np.abs(event.delta_v.vector))
+    # Over 0.15 s, with the tires' force after the contact, they are 10 (pole) and 21 mm/s apart.
+    assert abs(off[along]) < 1.96 * ends[along] < 0.02
 
 
 def test_the_camera_path_is_read_as_a_table(folder):

@@ -62,6 +62,7 @@ def test_it_comes_in_at_its_speed(name):
 def test_each_impact_changes_the_velocity_as_told(name):
     crash = CRASHES[name]
     assert len(crash.impacts) == len(crash.delta_v)
+    assert crash.ends == tuple(pulse_end(crash, i) for i in crash.impacts)
     for impact, told in zip(crash.impacts, crash.delta_v, strict=True):
         k = state(crash.motion, impact, pulse_end(crash, impact))
         change = in_vehicle(k, 0, k.velocity[1] - k.velocity[0])
