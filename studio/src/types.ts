@@ -99,7 +99,10 @@ export interface Fault {
 }
 
 export interface Checked {
-  toml: string; values: Record<string, unknown>; errors: Fault[]; questions?: Question[];
+  toml: string; values: Record<string, unknown>; errors: Fault[];
+  /** What was found before a value was set by hand, by key path. */
+  was?: Record<string, unknown>;
+  questions?: Question[];
   findings?: Finding[];
 }
 
