@@ -125,6 +125,8 @@ export interface RunDetail extends Run {
   over_ground?: boolean;
   command_line: string; answer?: string | null; job?: string | null;
   numbers: KeyNumber[]; options: Option[]; inputs: Input[]; findings: Finding[];
+  /** Reasons against the result, those of its verdict. */
+  against?: Finding[];
   from_s?: number; to_s?: number;
   panels?: { title: string; unit: string; columns: { name: string; label: string }[] }[];
   report: string | null; has: { track?: boolean; attitude?: boolean; series?: boolean; pdf?: boolean; toml?: boolean };

@@ -291,6 +291,25 @@ def test_a_result_is_told_as_people_read_it(tmp_path, monkeypatch):
     assert heading["shown"]["differences"][1] == "+7.7" and heading["within"][1] is False
 
 
+def test_the_reasons_against_a_result_stand_beside_its_verdict(tmp_path):
+    """Those of the verdict, in the studio's words, among what was noticed once each."""
+    spec = {"log": {"repair": False}, "coarse": {"duration_s": 60.0}}
+    whole = {"name": "a", "alignment": spec}
+    axes = Finding("io.axes-not-stated", severity="warning").plain()
+    unseen = Finding("navigation.nothing-observed", severity="warning").plain()
+    for_it = Finding("navigation.outage-test-passed", severity="note").plain()
+    trust = {"verdict": "reserve", "for": [for_it], "against": [unseen, axes]}
+    place = tmp_path / "a"
+    with write_bundle(place, command="align", configuration=whole, inputs=(), seals=[]) as staging:
+        write_json(staging / "align.json", {"coarse": {}, "findings": [axes], "trust": trust})
+    found = runs.run(tmp_path, "a")
+    assert found["verdict"] == "reserve"
+    codes = ["navigation.nothing-observed", "io.axes-not-stated"]
+    assert [one["code"] for one in found["against"]] == codes
+    assert [one["code"] for one in found["findings"]] == codes
+    assert "--" not in found["against"][1]["remedy"]
+
+
 def test_a_finding_that_is_not_known_is_in_the_words_of_its_result():
     for code in ("io.of-a-later-version", "../../x.y", "nothing", 3):
         told = runs._finding({"code": code, "data": {}, "sentence": "as it was", "remedy": "do"})

@@ -138,6 +138,9 @@ def run(folder: Path, name: str) -> dict[str, Any]:
     from strapdown.report.compare_folders import open_run
 
     has, sealed = {str(one["name"]) for one in manifest["outputs"]}, open_run(place, place.name)
+    against = [_finding(one) for one in _list(answer.get("trust"), "against")[:MOST]]
+    noticed = [_finding(one) for one in _list(answer, "findings")[:MOST]]
+    said = {(one["code"], one["text"]) for one in noticed}
     return {
         **summary(folder, name),
         **span,
@@ -150,7 +153,9 @@ def run(folder: Path, name: str) -> dict[str, Any]:
         ],
         # Without a heading the path of a crash is along the axes of the vehicle at its entry.
         "over_ground": manifest["command"] != "crash" or is_over_ground(answer),
-        "findings": [_finding(one) for one in _list(answer, "findings")[:MOST]],
+        # Why the verdict is not the best one; a reason is noticed, too, and once.
+        "against": against,
+        "findings": [one for one in against if (one["code"], one["text"]) not in said] + noticed,
         "versions": manifest["versions"],
         "command_line": _repeating(manifest, name),
         "report": f"runs/{name}/report.html" if "report.html" in has else None,
