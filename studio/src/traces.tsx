@@ -40,7 +40,7 @@ function looks(label: string, j: number): { ink: string; mark: string; width: nu
 const NOTHING: Record<string, number> = { deg: 1e-5, m: 1e-6, "m/s": 1e-6 };
 
 /** Numbers of an axis: zero where the step leaves nothing of it, and no zeros without meaning. */
-export function ticks(values: number[]): string[] {
+export function axisNumbers(values: number[]): string[] {
   const step = values.length > 1 ? Math.abs(values[1]! - values[0]!) : 0;
   return values.map((v) => Math.abs(v) < step * 1e-6 ? "0" : number(v, 6).replace(/\.?0+(?=e)/, ""));
 }
@@ -206,8 +206,8 @@ function OnePanel(props: Props & {
         } },
       },
       axes: [
-        { ...axis, size: 30, space: 90, values: (_, times, __, ___, step) => times.map((t) => t.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)))) },
-        { ...axis, size: 58, values: (_, values) => ticks(values) },
+        { ...axis, size: 30, space: 90, values: (_, ticks, __, ___, step) => ticks.map((t) => t.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)))) },
+        { ...axis, size: 58, values: (_, values) => axisNumbers(values) },
       ],
       cursor: {
         drag: { x: true, y: false, setScale: false }, points: { show: false },
