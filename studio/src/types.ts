@@ -155,7 +155,9 @@ export interface CrashQuick {
 }
 
 export interface LiveInfo {
-  protocols: { name: string; title: string; help: string; fields: Field[] }[];
+  protocols: { name: string; title: string; help: string; fields: (Field & { /** Addresses to choose from, and who reaches them. */ places?: [string, string][] })[] }[];
+  /** Files of the folder by which a live run can navigate. */
+  configurations?: string[];
   warning: string | null;
 }
 
