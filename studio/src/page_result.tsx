@@ -6,7 +6,7 @@ import { api, part } from "./api";
 import { Attitude, fromEuler } from "./attitude";
 import { bytes, date, plural, stamp } from "./format";
 import { indexOf, METERS_PER_DEG, Plan } from "./plan";
-import { Traces, type Panel } from "./traces";
+import { REFERENCE, Traces, type Panel } from "./traces";
 import type { Finding, KeyNumber, RunDetail, Series as SeriesData, Span, Track } from "./types";
 import { Busy, Command, Empty, Findings, More, Options, Page, Part, sentence, Table, Trouble, useRequest } from "./ui";
 
@@ -146,7 +146,7 @@ const middle = (low: number, high: number, angle: boolean) => angle && high - lo
 /** The motion of a result without positions on the Earth, such as that of a crash, by its series. */
 async function trackOfSeries(name: string, signal: AbortSignal): Promise<Track | null> {
   const there = Object.keys((await api.runSeries(name, { columns: [], width: 1 }, signal)).columns);
-  const algorithms = [...new Set(there.map((column) => BY_ALGORITHM.exec(column)?.[1]).filter((one) => one !== undefined))];
+  const algorithms = [...new Set(there.map((column) => BY_ALGORITHM.exec(column)?.[1]).filter((one) => one !== undefined && one !== REFERENCE))];
   // Of several algorithms the exact one that all peers have; else the last: they go from simple to good.
   const by = algorithms.includes("quaternion") ? "quaternion" : algorithms[algorithms.length - 1];
   const wanted = ["north_m", "east_m", ...["roll_deg", "pitch_deg", "heading_deg"].map((angle) => by ? `${by} ${angle}` : angle)];
