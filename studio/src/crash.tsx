@@ -1,28 +1,39 @@
 // A crash while its parameters move: delta-V, the direction of force on a clock face, the path.
 
-import { useEffect, useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { aborted, api, problemOf } from "./api";
 import { number } from "./format";
 import { round } from "./plan";
 import type { CrashQuick, Problem } from "./types";
 import { Empty, Findings, Part, Trouble } from "./ui";
 
-interface Slider { id: string; label: string; unit: string; value: number; reach: number; step: number; write: (value: number) => [string, unknown] }
+/** `value`: as written; `origin`: as it was before it was set by hand, which the slider meets. */
+interface Slider { id: string; key: string; at: number | null; label: string; unit: string; value: number; origin: number; reach: number; step: number }
+
+/** Decimals of a number, at most nine. */
+const decimals = (value: number) => { const [digits, power = "0"] = String(value).split("e"); return Math.min(9, Math.max(0, (digits!.split(".")[1] ?? "").length - Number(power))); };
+
+/** The value so many steps from the origin: exactly the origin at none. */
+function stepped({ origin, step }: Slider, steps: number): number {
+  return steps ? Number((origin + steps * step).toFixed(Math.max(decimals(origin), decimals(step)))) : origin;
+}
+
+/** Steps to each side of the origin; a value that was written stays within reach. */
+const stepsOf = ({ origin, value, reach, step }: Slider) => Math.ceil(Math.max(reach, Math.abs(value - origin)) / step - 1e-9);
 
 /** What is worth a slider: how fast it was, and where and how the recorder sits. */
-function slidersOf(values: Record<string, unknown>, unit: number): Slider[] {
+function slidersOf(values: Record<string, unknown>, was: Record<string, unknown>, unit: number): Slider[] {
   const sliders: Slider[] = [];
   const speed = ["entry.speed_km_per_h", "entry.speed_m_per_s"].find((key) => typeof values[key] === "number");
   if (speed) {
-    const value = values[speed] as number;
-    sliders.push({ id: speed, label: "Speed at the entry", unit: speed.endsWith("km_per_h") ? "km/h" : "m/s", value, reach: Math.max(5, 0.3 * Math.abs(value)), step: 0.1, write: (v) => [speed, v] });
+    const value = values[speed] as number, origin = typeof was[speed] === "number" ? was[speed] : value;
+    sliders.push({ id: speed, key: speed, at: null, label: "Speed at the entry", unit: speed.endsWith("km_per_h") ? "km/h" : "m/s", value, origin, reach: Math.max(5, 0.3 * Math.abs(origin)), step: 0.1 });
   }
   const list = (key: string, labels: string[], measure: string, reach: number, step: number) => {
     const all = values[key];
     if (!Array.isArray(all) || all.some((v) => typeof v !== "number")) return;
-    labels.forEach((label, i) => sliders.push({
-      id: `${key}.${i}`, label, unit: measure, value: all[i] as number, reach, step, write: (v) => [key, all.map((old, j) => j === i ? v : old)],
-    }));
+    const before = was[key], origins = Array.isArray(before) && before.length === all.length && before.every((v) => typeof v === "number") ? before as number[] : all as number[];
+    labels.forEach((label, i) => sliders.push({ id: `${key}.${i}`, key, at: i, label, unit: measure, value: all[i] as number, origin: origins[i]!, reach, step }));
   };
   const at = `units.${unit}`;
   list(`${at}.position_m`, ["Recorder forward", "Recorder right", "Recorder down"], "m", 1, 0.01);
@@ -31,27 +42,39 @@ function slidersOf(values: Record<string, unknown>, unit: number): Slider[] {
   return sliders;
 }
 
-export function CrashPreview({ toml, values, ready, onKeep }: {
-  toml: string; values: Record<string, unknown>; ready: boolean; onKeep: (set: Record<string, unknown>) => void;
+/** The values of the case with those of sliders in their place. */
+function written(sliders: Slider[], values: Record<string, unknown>, of: (slider: Slider) => number | undefined): Record<string, unknown> {
+  const set: Record<string, unknown> = {};
+  for (const slider of sliders) {
+    const value = of(slider);
+    if (value === undefined || value === slider.value) continue;
+    if (slider.at === null) { set[slider.key] = value; continue; }
+    // Two numbers of one list: each in its place.
+    const list = [...((set[slider.key] ?? values[slider.key]) as unknown[])];
+    list[slider.at] = value;
+    set[slider.key] = list;
+  }
+  return set;
+}
+
+export function CrashPreview({ toml, values, was, ready, onKeep }: {
+  toml: string; values: Record<string, unknown>; was: Record<string, unknown>; ready: boolean; onKeep: (set: Record<string, unknown>) => void;
 }) {
   const [moved, setMoved] = useState<Record<string, number>>({});
   const [unit, setUnit] = useState(0);
   const [quick, setQuick] = useState<CrashQuick | null>(null);
   const [first, setFirst] = useState<CrashQuick | null>(null);
   const [problem, setProblem] = useState<Problem | null>(null);
-  const sliders = useMemo(() => slidersOf(values, unit), [values, unit]);
-  const set = useMemo(() => {
-    const written: Record<string, unknown> = {};
-    for (const slider of sliders) {
-      const value = moved[slider.id];
-      if (value === undefined) continue;
-      const [key, all] = slider.write(value);
-      const before = written[key];
-      // Two numbers of one list: each in its place.
-      written[key] = Array.isArray(before) && Array.isArray(all) ? all.map((v, i) => v === (values[key] as unknown[])[i] ? before[i] : v) : all;
-    }
-    return written;
-  }, [sliders, moved]);
+  // What was written here without a remark on what it was is remembered as long as the page is.
+  const kept = useRef<Record<string, unknown>>({});
+  const sliders = useMemo(() => slidersOf(values, { ...kept.current, ...was }, unit), [values, was, unit]);
+  const set = useMemo(() => written(sliders, values, (slider) => moved[slider.id]), [sliders, moved]);
+  const back = useMemo(() => written(sliders, values, (slider) => slider.origin), [sliders]);
+  const keep = () => {
+    for (const key of Object.keys(set)) kept.current = { [key]: values[key], ...kept.current };
+    onKeep(set);
+  };
+  const restore = () => { setMoved({}); if (Object.keys(back).length) onKeep(back); };
   useEffect(() => setMoved({}), [toml, unit]);
   useEffect(() => {
     if (!ready) return;
@@ -81,13 +104,14 @@ export function CrashPreview({ toml, values, ready, onKeep }: {
       <PathView quick={quick} before={before} />
       <div class="sliders">
         <h3>What if…</h3>
+        <p class="follows" aria-hidden="true"><b>{quick.delta_v?.shown ?? "no impact"}</b>{quick.pdof && <span>force from {quick.pdof.clock} o'clock, {number(quick.pdof.deg, 3)}°</span>}</p>
         {sliders.map((p) => <label key={p.id}>{p.label}
-          <input type="range" min={p.value - p.reach} max={p.value + p.reach} step={p.step} value={moved[p.id] ?? p.value} aria-valuetext={`${number(moved[p.id] ?? p.value)} ${p.unit}`}
-            onInput={(e) => setMoved({ ...moved, [p.id]: Math.round(e.currentTarget.valueAsNumber / p.step) * p.step })} />
+          <input type="range" min={stepped(p, -stepsOf(p))} max={stepped(p, stepsOf(p))} step={p.step} value={moved[p.id] ?? p.value} aria-valuetext={`${number(moved[p.id] ?? p.value)} ${p.unit}`}
+            onInput={(e) => setMoved({ ...moved, [p.id]: stepped(p, Math.round((e.currentTarget.valueAsNumber - p.origin) / p.step)) })} />
           <output>{number(moved[p.id] ?? p.value)} {p.unit}</output></label>)}
         <div class="row">
-          <button type="button" disabled={!changed} onClick={() => setMoved({})}>As it was</button>
-          <button type="button" disabled={!changed} onClick={() => onKeep(set)}>Write into the case</button>
+          <button type="button" disabled={!changed && !Object.keys(back).length} onClick={restore}>As it was</button>
+          <button type="button" disabled={!changed} onClick={keep}>Write into the case</button>
         </div>
       </div>
     </div>}

@@ -54,6 +54,9 @@ function Found({ found }: { found: Comparison }) {
   const rest = differ.filter((row) => !main.includes(row)), same = found.numbers.filter((row) => row.same);
   const findings = found.findings_of_runs.filter((one) => one.differs);
   const inputs = found.inputs.filter((row) => !row.same);
+  // Runs of one log share what is wrong with it.
+  const logs = found.inputs.filter((row) => ["log", "record"].includes(row.role.split(": ").pop()!));
+  const ofOneLog = others.filter((_, i) => logs.some((row) => ["same", "renamed"].includes(row.status[i + 1] ?? "")));
   const options = (some: Comparison["options"]) => <Table stack head={["Option", ...names]} rows={some.map((row) => [<code>{row.key}</code>, ...row.values.map((one) => one === null ? "none" : written(one))])} />;
   const numbers = (some: Row[]) => [...new Set(some.map((row) => row.group))].map((group) => <Table stack key={group} caption={group || "Result"}
     head={["Quantity", ...names, ...others.map((name) => others.length > 1 ? `Difference of ${name}` : "Difference")]} numeric={[...names, ...others].map((_, i) => i + 1)}
@@ -67,7 +70,7 @@ function Found({ found }: { found: Comparison }) {
     <Findings findings={found.findings} />
     <Part title="Numbers that differ">
       {!differ.length && <Empty>No number differs.</Empty>}
-      {main.length > 0 && <p class="help">With 95 % bounds. A difference is a result minus {names[0]}; its bound is that of two independent errors.</p>}
+      {main.length > 0 && <p class="help">With 95 % bounds. A difference is a result minus {names[0]}. {boundWords(ofOneLog, others)}</p>}
       {numbers(main)}
       {rest.length > 0 && <More title={main.length ? plural(rest.length, "further number", "further numbers") : plural(rest.length, "number")} open={!main.length}>{numbers(rest)}</More>}
       {same.length > 0 && <More title={`${plural(same.length, "number")} that ${same.length === 1 ? "is" : "are"} the same`}>{numbers(same)}</More>}
@@ -88,6 +91,14 @@ function Found({ found }: { found: Comparison }) {
       <iframe class="report" title="The comparison as a page" sandbox="allow-scripts" referrerpolicy="no-referrer" src={found.page} /></Part>}
     {found.command_line && <Part title="The same from a terminal"><Command text={found.command_line} /></Part>}
   </>;
+}
+
+/** What the bound of a difference says; `ofOneLog`: results that are of the log of the first. */
+function boundWords(ofOneLog: string[], others: string[]): string {
+  const independent = "Its bound is that of two independent errors.";
+  if (!ofOneLog.length) return independent;
+  const which = ofOneLog.length < others.length ? `${independent} ${ofOneLog.join(" and ")} and the first are of one log` : "The results are of one log";
+  return `${which}: they share its errors, so a bound as of independent errors is too wide. A difference beyond it says that one of the two bounds does not hold; one within it confirms neither.`;
 }
 
 /** How a file stands to that of the first result. */

@@ -110,6 +110,8 @@ const FLAGS: Record<string, string> = {
   "--png": "Figures as PNG, too", "--timing": "Measure the times of the algorithms, too",
 };
 
+const NOTHING: Record<string, unknown> = {};
+
 function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
   const { work, state } = useShared();
   const [checked, setChecked] = useState<Checked | null>(null);
@@ -197,7 +199,7 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
       </section>
     </div>
     <Positions values={values} onSet={set} />
-    {kind === "crash" && <CrashPreview toml={work.toml} values={values} ready={!checking && errors.length === 0 && questions.length === 0} onKeep={set} />}
+    {kind === "crash" && <CrashPreview toml={work.toml} values={values} was={checked?.was ?? NOTHING} ready={!checking && errors.length === 0 && questions.length === 0} onKeep={set} />}
     {flags.some((flag) => flag in FLAGS) && <fieldset class="row flags"><legend>Options</legend>
       {flags.filter((flag) => flag in FLAGS).map((flag) => <label class="inline" key={flag}><input type="checkbox" checked={flag === SMOOTH ? values["smoother.kind"] === "rts" : work.options.includes(flag)}
         onChange={(e) => flag === SMOOTH ? set({ "smoother.kind": e.currentTarget.checked ? "rts" : "none" }) : setWork({ options: e.currentTarget.checked ? [...work.options, flag] : work.options.filter((o) => o !== flag) })} />{FLAGS[flag]}</label>)}

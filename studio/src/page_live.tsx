@@ -5,8 +5,8 @@ import { useMemo, useState } from "preact/hooks";
 import { encode } from "uqr";
 import { api, problemOf } from "./api";
 import { Attitude, fromEuler, type Quaternion } from "./attitude";
-import { number, stamp } from "./format";
-import { Plan, type Line } from "./plan";
+import { bounded, number, stamp } from "./format";
+import { METERS_PER_DEG, Plan, type Line } from "./plan";
 import { newWork, putJob, useShared } from "./store";
 import { Traces, type Panel } from "./traces";
 import type { Job, Problem, Series, Span } from "./types";
@@ -28,7 +28,7 @@ export function LivePage({ id }: { id: string }) {
 
 function Begin() {
   const { state } = useShared();
-  const info = useRequest(() => api.live(), []);
+  const info = useRequest(() => api.live(), [(state?.files ?? []).map((file) => file.name).filter((one) => one.toLowerCase().endsWith(".toml")).join("|")]);
   const [protocol, setProtocol] = useState("");
   const [name, setName] = useState(() => {
     let i = 1;
@@ -37,9 +37,12 @@ function Begin() {
   });
   const [options, setOptions] = useState<Record<string, unknown>>({});
   const [run, setRun] = useState("");
-  const configurations = (state?.files ?? []).map((file) => file.name).filter((one) => one.toLowerCase().endsWith(".toml") && !one.includes("/"));
+  const configurations = info.value?.configurations ?? [];
   const [problem, setProblem] = useState<Problem | null>(null);
   const chosen = info.value?.protocols.find((one) => one.name === protocol) ?? info.value?.protocols[0];
+  const places = chosen?.fields.find((one) => one.key === "listen")?.places ?? [];
+  const at = chosen?.fields.find((one) => one.key === "listen" || one.key === "udp");
+  const address = at ? String(options[at.key] ?? at.default ?? "") : "";
   const taken = state?.runs.some((run) => run.name === name) || state?.files.some((file) => file.name === name) || state?.jobs.some((job) => job.name === name && (job.state === "running" || job.state === "waiting"));
   const begin = async () => {
     if (!chosen) return;
@@ -72,9 +75,15 @@ function Begin() {
         </select>
         <p class="help" id="liverunhelp">{configurations.length ? "A configuration of a navigation gives position and velocity, too; its sensor, start and aiding are used, its log is not." : "For position and velocity, too, bring the configuration of a navigation (.toml) into the folder, or set one up from a log of this sensor."}</p>
       </div></div>
+      {places.length > 0 && <fieldset class="list"><legend>Who can reach it</legend>
+        {places.map(([place, words]) => <label class="item" key={place}>
+          <input type="radio" name="place" checked={address === place} onChange={() => setOptions({ ...options, listen: place })} />
+          <span class="name">{words}</span><span class="soft">{place}</span></label>)}
+      </fieldset>}
       <div class="fields">{chosen.fields.map((field) => <Control key={`${chosen.name}.${field.key}`} field={field} value={options[field.key]}
         onChange={(value) => { const rest = { ...options }; if (value === null) delete rest[field.key]; else rest[field.key] = value; setOptions(rest); }} />)}</div>
-      {info.value!.warning && <p class="notice warn">{sentence(info.value!.warning)}</p>}
+      {address && LOCAL.test(address) && <p class="notice warn" role="status">A phone cannot reach {address}: only programs on this computer can.{places.length > 0 && " For a phone in the same network choose 0.0.0.0 above."}</p>}
+      {info.value!.warning && address && !LOCAL.test(address) && <p class="notice warn" role="status">{sentence(info.value!.warning)}</p>}
       <div class="next startrun">
         <label class="inline">Name of the session <input type="text" value={name} onInput={(e) => setName(e.currentTarget.value)} /></label>
         <button type="button" class="main" disabled={!name.trim() || taken} onClick={() => void begin()}>Listen</button>
@@ -138,8 +147,9 @@ function Session({ job }: { job: Job }) {
   </Part>;
 }
 
-/** Addresses that no other machine reaches. */
+/** Addresses that no other machine reaches, of a page and as they are written. */
 const LOOPBACK = /^https?:\/\/(127\.|localhost|\[::1\])/;
+const LOCAL = /^(127\.|localhost|\[::1\])/;
 
 const CURVES: [string, string, string[]][] = [["Roll and pitch", "deg", ["roll", "pitch"]], ["Heading", "deg", ["heading"]], ["Velocity", "m/s", ["VN", "VE", "VD"]]];
 
@@ -161,15 +171,28 @@ function LiveState({ lines, session }: { lines: Record<string, unknown>[]; sessi
     const of = (name: string) => seen.map((line) => num(line, name));
     return { t: seen.map((line) => num(line, "time")!), columns: Object.fromEntries(columns.map((name) => [name, { unit: null, low: of(name), high: of(name) }])) };
   };
-  const rows = Object.entries(last).filter(([key, value]) => typeof value === "number" && key !== "time" && key !== "unix");
+  const rows = Object.entries(last).filter(([key, value]) => typeof value === "number" && key !== "time" && key !== "unix" && !key.endsWith("_sd"));
   return <>
     <div class="motion">
       <Attitude q={attitudeOf(last)} at={`${stamp(time, 10)} s:`} />
       {track && <Plan track={track} fixes={null} cursor={cursor ?? time} onCursor={setCursor} />}
     </div>
     {panels.length > 0 && <Traces panels={panels} whole={whole} askKey={session} ask={ask} cursor={cursor} onCursor={setCursor} />}
-    {rows.length > 0 && <More title="Numbers"><Table head={["", "Value", "Unit"]} numeric={[1]} rows={rows.map(([key, value]) => [key.replaceAll("_", " "), number(value as number, 7), UNITS[key.replace(/_sd$/, "")] ?? ""])} /></More>}
+    {rows.length > 0 && <More title="Numbers"><Table head={["", "Value", "95 % bound"]} numeric={[1, 2]} rows={rows.map(([key, value]) => [NAMES[key] ?? key.replaceAll("_", " "), ...live(last, key, value as number)])} /></More>}
   </>;
+}
+
+/** Standard deviations of another name than that of the quantity. */
+const SD: Record<string, string> = { lat: "north_sd", lon: "east_sd", alt: "down_sd" };
+const NAMES: Record<string, string> = { lat: "Latitude", lon: "Longitude", alt: "Height", VN: "Velocity north", VE: "Velocity east", VD: "Velocity down", roll: "Roll", pitch: "Pitch", heading: "Heading" };
+
+/** A number of a live state with its unit, and its bound with that of its own. */
+function live(line: Record<string, unknown>, key: string, value: number): [string, string] {
+  const unit = UNITS[key] ?? "", sd = num(line, SD[key] ?? `${key}_sd`), place = key === "lat" || key === "lon";
+  // A bound of a place is along the ground.
+  const scale = !place ? 1 : 1 / (METERS_PER_DEG * (key === "lon" ? Math.max(Math.cos((num(line, "lat") ?? 0) * Math.PI / 180), 1e-6) : 1));
+  const [said, bound] = sd === null ? [number(value, place ? 8 : 4), ""] : bounded(value, sd, scale);
+  return [`${said}\u00a0${unit}`, bound ? `${bound}\u00a0${place ? "m" : unit}` : "not stated"];
 }
 
 const UNITS: Record<string, string> = { lat: "deg", lon: "deg", alt: "m", VN: "m/s", VE: "m/s", VD: "m/s", roll: "deg", pitch: "deg", heading: "deg" };

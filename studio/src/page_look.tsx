@@ -343,13 +343,23 @@ export function suffices(kind: Kind, look: Look): { answer: string; reasons: Fin
   const say = (answer: string, text: string) => ({ answer, reasons: [{ code: "studio.rests", severity: "note", text }] });
   const rest = longest ? `the longest rest is ${duration(longest)}` : "no rest was found";
   if (kind.kind === "align") return say(longest > 0 ? "with limits" : "no", `${rest}; roll and pitch by any accelerometer, a heading only by gyros that feel the rotation of the Earth, not by those of a phone: state it for these`);
+  // A rest is a pose; which way up it was, and how fast a turn was, a log alone does not say.
+  if (kind.kind === "calibrate") {
+    const gyro = look.logs.some((log) => log.read_as.some((one) => /^-?gyro/.test(one.quantity)));
+    const poses = look.rests.length ? `${look.rests.length === 1 ? "one rest was" : `${look.rests.length} rests were`} found, each a pose at most; whether their attitudes differ enough, and what each was, is not known` : "no rest was found, and a pose is one";
+    return say(look.rests.length ? "not known" : "no", gyro ? `${poses}; a gyro is there` : `${poses}; no gyro was read, so biases and scales of the accelerometer alone`);
+  }
   if (kind.kind === "allan") return say(longest >= 3600 ? "yes" : longest >= 300 ? "with limits" : "no", `${rest}; an hour is better than a minute`);
   return null;
 }
 
 const ANSWERS: Record<string, { words: string; look: string }> = {
   yes: { words: "This log has it", look: "good" }, "with limits": { words: "Possible, with limits", look: "warn" }, no: { words: "This log does not suffice", look: "bad" },
+  "not known": { words: "Not known whether it suffices", look: "" },
 };
+
+/** The best answers come first: to the first that any kind has goes the button that stands out. */
+const BEST = ["yes", "with limits"];
 
 export function ChoosePage() {
   const { work } = useShared();
@@ -362,13 +372,15 @@ export function ChoosePage() {
   if (!work.files.length) {
     return <Page title="No file chosen"><Empty><a href="#/files">Choose a file</a> first.</Empty></Page>;
   }
+  const fits = new Map((kinds.value ?? []).map((kind) => [kind.kind, look.value ? suffices(kind, look.value) : null]));
+  const best = BEST.find((answer) => [...fits.values()].some((fit) => fit?.answer === answer));
   return <Page title="What do you want to find out?">
     <Trouble problem={kinds.problem} retry={kinds.again} />
     <Trouble problem={look.problem} retry={look.again} />
     {(kinds.busy || look.busy) && <Busy>One moment…</Busy>}
     <ul class="kinds">
       {kinds.value?.map((kind) => {
-        const fit = look.value ? suffices(kind, look.value) : null;
+        const fit = fits.get(kind.kind) ?? null;
         const answer = fit ? ANSWERS[fit.answer] : null;
         return <li key={kind.kind}>
           <h2>{kind.title}</h2>
@@ -376,7 +388,7 @@ export function ChoosePage() {
           <p class="soft">It needs: {kind.needs}</p>
           {answer && <p class={`verdict ${answer.look}`}>{answer.words}</p>}
           {fit && fit.reasons.length > 0 && <More title="Why"><Findings findings={fit.reasons} /></More>}
-          <button type="button" class={fit?.answer === "no" ? "" : "main"} onClick={() => choose(kind.kind)}>{kind.title}</button>
+          <button type="button" class={fit && fit.answer === best ? "main" : ""} onClick={() => choose(kind.kind)}>{kind.title}</button>
         </li>;
       })}
     </ul>

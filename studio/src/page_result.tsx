@@ -6,9 +6,9 @@ import { api, part } from "./api";
 import { Attitude, fromEuler } from "./attitude";
 import { bytes, date, plural, stamp } from "./format";
 import { indexOf, METERS_PER_DEG, Plan } from "./plan";
-import { Traces, type Panel } from "./traces";
-import type { KeyNumber, RunDetail, Series as SeriesData, Span, Track } from "./types";
-import { Busy, Command, Empty, Findings, More, Options, Page, Part, Table, Trouble, useRequest } from "./ui";
+import { REFERENCE, Traces, type Panel } from "./traces";
+import type { Finding, KeyNumber, RunDetail, Series as SeriesData, Span, Track } from "./types";
+import { Busy, Command, Empty, Findings, More, Options, Page, Part, sentence, Table, Trouble, useRequest } from "./ui";
 
 export function ResultPage({ name }: { name: string }) {
   const run = useRequest(() => api.run(name), [name]);
@@ -29,6 +29,7 @@ function Result({ run }: { run: RunDetail }) {
   ];
   return <>
     {run.verdict && VERDICTS[run.verdict] && <p class={`verdict ${VERDICTS[run.verdict]!.look}`}>{VERDICTS[run.verdict]!.words}</p>}
+    <Against reasons={run.against ?? []} />
     <Numbers numbers={run.numbers} />
     <div class="row exports" role="group" aria-label="Take it with you">
       {exports.filter(([, , has]) => has).map(([as, words]) => <a class="button" key={as} href={api.exportOf(run.name, as)} download>{words}</a>)}
@@ -58,6 +59,19 @@ function Result({ run }: { run: RunDetail }) {
 const VERDICTS: Record<string, { words: string; look: string }> = {
   trusted: { words: "The result can be trusted", look: "good" }, reserve: { words: "Use with caution", look: "warn" }, distrusted: { words: "Do not trust the result", look: "bad" },
 };
+
+/** Reasons that stand beside the verdict; the rest is folded. */
+const FEW = 3;
+
+/** Why a result is not trusted without reserve. */
+function Against({ reasons }: { reasons: Finding[] }) {
+  if (!reasons.length) return null;
+  const list = (some: Finding[]) => <ul class="plain">{some.map((one, i) => <li key={i}>{sentence(one.text ?? one.code)}</li>)}</ul>;
+  return <div class="against" role="group" aria-label="Reasons against it">
+    {list(reasons.slice(0, FEW))}
+    {reasons.length > FEW && <More title={plural(reasons.length - FEW, "further reason")}>{list(reasons.slice(FEW))}</More>}
+  </div>;
+}
 
 /** What people ask for first, by the names of `strapdown compare`. */
 const MAIN = [
@@ -132,7 +146,7 @@ const middle = (low: number, high: number, angle: boolean) => angle && high - lo
 /** The motion of a result without positions on the Earth, such as that of a crash, by its series. */
 async function trackOfSeries(name: string, signal: AbortSignal): Promise<Track | null> {
   const there = Object.keys((await api.runSeries(name, { columns: [], width: 1 }, signal)).columns);
-  const algorithms = [...new Set(there.map((column) => BY_ALGORITHM.exec(column)?.[1]).filter((one) => one !== undefined))];
+  const algorithms = [...new Set(there.map((column) => BY_ALGORITHM.exec(column)?.[1]).filter((one) => one !== undefined && one !== REFERENCE))];
   // Of several algorithms the exact one that all peers have; else the last: they go from simple to good.
   const by = algorithms.includes("quaternion") ? "quaternion" : algorithms[algorithms.length - 1];
   const wanted = ["north_m", "east_m", ...["roll_deg", "pitch_deg", "heading_deg"].map((angle) => by ? `${by} ${angle}` : angle)];

@@ -21,8 +21,29 @@ type Sources = Record<string, Series>;
 
 const sourceOf = (panel: Panel) => panel.source ?? "";
 
-const COLORS = ["--trace1", "--trace2", "--trace3", "--trace4"];
+/** Colors of traces, of which the later ones are dashed, too. */
+const COLORS = ["--trace1", "--trace2", "--trace3", "--trace4", "--trace5", "--trace6", "--trace7", "--trace8"];
+const SOLID = 4, DASH = [7, 4], DOTS = [2, 4];
 const HEIGHT = 180;
+
+/** The name of a trace that others are held against. */
+export const REFERENCE = "reference";
+
+/** How the trace of a panel looks, by its number: no two alike among the first sixteen. */
+function looks(label: string, j: number): { ink: string; mark: string; width: number; dash?: number[] } {
+  if (label === REFERENCE) return { ink: "--ink", mark: "dot tref", width: 2, dash: DOTS };
+  const i = j % COLORS.length, again = j >= COLORS.length;
+  return { ink: COLORS[i]!, mark: `dot t${i + 1}${again ? " again" : ""}`, width: again ? 2 : 1, ...(i >= SOLID ? { dash: DASH } : again ? { dash: DOTS } : {}) };
+}
+
+/** Values below this are zero to rounding, by unit, and are drawn as zero. */
+const NOTHING: Record<string, number> = { deg: 1e-5, m: 1e-6, "m/s": 1e-6 };
+
+/** Numbers of an axis: zero where the step leaves nothing of it, and no zeros without meaning. */
+export function axisNumbers(values: number[]): string[] {
+  const step = values.length > 1 ? Math.abs(values[1]! - values[0]!) : 0;
+  return values.map((v) => Math.abs(v) < step * 1e-6 ? "0" : number(v, 6).replace(/\.?0+(?=e)/, ""));
+}
 
 interface Props {
   panels: Panel[]; ask: Ask; whole: Span; askKey: string;
@@ -142,7 +163,7 @@ function Readout({ panels, series, cursor, whole }: { panels: Panel[]; series: S
         const one = own.columns[column.name], i = indexAt(own.t, cursor);
         const low = one?.low[i], high = one?.high[i];
         if (low === null || low === undefined || high === null || high === undefined) return null;
-        return <span key={column.name}><i class={`dot t${j % COLORS.length + 1}`} />{column.label} {low === high ? number(low) : `${number(low, 3)} to ${number(high, 3)}`} {panel.unit}</span>;
+        return <span key={column.name}><i class={looks(column.label, j).mark} />{column.label} {low === high ? number(low) : `${number(low, 3)} to ${number(high, 3)}`} {panel.unit}</span>;
       })}
     </span>)}
   </p>;
@@ -169,17 +190,24 @@ function OnePanel(props: Props & {
     const lines: uPlot.Series[] = [{}];
     const bands: uPlot.Band[] = [];
     panel.columns.forEach(({ label }, j) => {
-      const stroke = () => color(COLORS[j % COLORS.length]!);
-      lines.push({ label, stroke, width: 1, points: { show: false } }, { label: `${label} (least)`, stroke, width: 1, points: { show: false } });
-      bands.push({ series: [2 * j + 1, 2 * j + 2], fill: () => color(COLORS[j % COLORS.length]!) + "55" });
+      const { ink, mark: _, ...look } = looks(label, j), stroke = () => color(ink);
+      lines.push({ label, stroke, ...look, points: { show: false } }, { label: `${label} (least)`, stroke, ...look, points: { show: false } });
+      bands.push({ series: [2 * j + 1, 2 * j + 2], fill: () => color(ink) + "55" });
     });
     const axis = { stroke: () => color("--soft"), grid: { stroke: () => color("--faint"), width: 1 }, ticks: { stroke: () => color("--line"), width: 1 }, font: "12px system-ui, sans-serif" };
     const made = new uPlot({
       width, height: HEIGHT, series: lines, bands, legend: { show: false },
-      scales: { x: { time: false, range: () => latest.current.view as [number, number] } },
+      scales: {
+        x: { time: false, range: () => latest.current.view as [number, number] },
+        y: { range: (_, low, high) => {
+          if (low === null || high === null) return [-1, 1];
+          const least = NOTHING[panel.unit] ?? 0;
+          return Math.max(Math.abs(low), Math.abs(high)) <= least ? [-1, 1] : uPlot.rangeNum(low, high, 0.1, true);
+        } },
+      },
       axes: [
         { ...axis, size: 30, space: 90, values: (_, ticks, __, ___, step) => ticks.map((t) => t.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)))) },
-        { ...axis, size: 58, values: (_, ticks) => ticks.map((v) => number(v, 6)) },
+        { ...axis, size: 58, values: (_, values) => axisNumbers(values) },
       ],
       cursor: {
         drag: { x: true, y: false, setScale: false }, points: { show: false },
@@ -225,7 +253,7 @@ function OnePanel(props: Props & {
 
   return <div class="panel">
     <div class="paneltitle"><b>{panel.title}</b> <span class="soft">{panel.unit}</span>
-      {panel.columns.map(({ label }, j) => <span class="key" key={label}><i class={`dot t${j % COLORS.length + 1}`} />{label}</span>)}</div>
+      {panel.columns.map(({ label }, j) => <span class="key" key={label}><i class={looks(label, j).mark} />{label}</span>)}</div>
     <div ref={place} class="plot" aria-hidden="true" />
   </div>;
 }

@@ -99,7 +99,10 @@ export interface Fault {
 }
 
 export interface Checked {
-  toml: string; values: Record<string, unknown>; errors: Fault[]; questions?: Question[];
+  toml: string; values: Record<string, unknown>; errors: Fault[];
+  /** What was found before a value was set by hand, by key path. */
+  was?: Record<string, unknown>;
+  questions?: Question[];
   findings?: Finding[];
 }
 
@@ -122,6 +125,8 @@ export interface RunDetail extends Run {
   over_ground?: boolean;
   command_line: string; answer?: string | null; job?: string | null;
   numbers: KeyNumber[]; options: Option[]; inputs: Input[]; findings: Finding[];
+  /** Reasons against the result, those of its verdict. */
+  against?: Finding[];
   from_s?: number; to_s?: number;
   panels?: { title: string; unit: string; columns: { name: string; label: string }[] }[];
   report: string | null; has: { track?: boolean; attitude?: boolean; series?: boolean; pdf?: boolean; toml?: boolean };
@@ -150,7 +155,9 @@ export interface CrashQuick {
 }
 
 export interface LiveInfo {
-  protocols: { name: string; title: string; help: string; fields: Field[] }[];
+  protocols: { name: string; title: string; help: string; fields: (Field & { /** Addresses to choose from, and who reaches them. */ places?: [string, string][] })[] }[];
+  /** Files of the folder by which a live run can navigate. */
+  configurations?: string[];
   warning: string | null;
 }
 

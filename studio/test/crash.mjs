@@ -96,6 +96,14 @@ await run(async () => {
   await click("Write into the case");
   await page.waitForFunction(() => /angles_deg = \[0(\.0)?, 0(\.0)?, 2(\.0)?\]/.test(document.querySelector("textarea").value));
   await see("in step with the form");
+  // As it was, after writing too; then the same once more.
+  await click("As it was");
+  await page.waitForFunction(() => /angles_deg = \[0(\.0)?, 0(\.0)?, 0(\.0)?\]/.test(document.querySelector("textarea").value));
+  await see("in step with the form");
+  for (let i = 0; i < 20; i++) await slider.press("ArrowRight");
+  await click("Write into the case");
+  await page.waitForFunction(() => /angles_deg = \[0(\.0)?, 0(\.0)?, 2(\.0)?\]/.test(document.querySelector("textarea").value));
+  await see("in step with the form");
   await click("Run it");
   await page.getByRole("link", { name: "See the result" }).waitFor({ timeout: 600_000 });
   await page.getByRole("link", { name: "See the result" }).click();

@@ -98,6 +98,11 @@ await run(async () => {
   await page.getByRole("link", { name: "Choose what to find out" }).click();
   await see("What do you want to find out?");
   await page.getByRole("button", { name: "Navigation", exact: true }).waitFor();
+  await page.locator(".kinds .verdict").first().waitFor();
+  const kinds = await page.locator(".kinds > li").evaluateAll((all) => all.map((one) => ({ kind: one.querySelector("h2").textContent, verdict: one.querySelector(".verdict")?.textContent, filled: one.querySelector("button.main") !== null })));
+  assert.ok(kinds.every((one) => one.verdict), "each says whether the log suffices");
+  assert.ok(kinds.some((one) => one.filled) && new Set(kinds.filter((one) => one.filled).map((one) => one.verdict)).size === 1, "the best stand out");
+  assert.match(kinds.find((one) => /^Calibration/.test(one.kind)).verdict, /Not known|does not suffice/);
   await look("4-choose");
   await page.getByRole("button", { name: "Navigation", exact: true }).click();
 

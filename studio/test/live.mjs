@@ -22,6 +22,12 @@ function message(number) {
 await run(async () => {
   await page.goto(`${address}#/live`);
   await see("Start listening");
+  // What a phone cannot reach is said before it listens, and what it can is one click away.
+  await see(/A phone cannot reach 127\.0\.0\.1:8437/);
+  await page.getByRole("radio", { name: /^Phones in the same network/ }).check();
+  await see(/is reached from the network/);
+  assert.equal(await page.getByRole("textbox", { name: "Address" }).inputValue(), "0.0.0.0:8437");
+  assert.equal(await page.getByText("A phone cannot reach").count(), 0);
   await page.getByRole("textbox", { name: "Address" }).fill("127.0.0.1:0");
   await page.getByRole("textbox", { name: "Address" }).press("Enter");
   await page.getByRole("combobox", { name: "Phone" }).selectOption("android");

@@ -64,6 +64,68 @@ def test_a_change_keeps_every_comment_and_the_order():
     assert changed.replace("7.5", "5.0").replace("[1.0, 2.0, 3.0]", "[0.1, 0.2, 0.3]") == TEXT
 
 
+FOUND = """[entry]
+speed_km_per_h = 57.090            # found: in the record, km/h
+speed_sd_km_per_h = 1.0            # own words
+
+[[units]]
+# found: at rest its z points up,
+# which is roll and pitch
+levelling_deg = [0.10, 0.2]
+angles_deg = [1.0, 2.0, 3.0]  # assumed: it looks ahead
+position_m = ["?", "?", "?"]  # found: the record says 'floor'; only you know: m
+"""
+
+
+def test_a_value_set_by_hand_says_so_and_what_it_was():
+    moved = {
+        "entry.speed_km_per_h": 57.1,
+        "entry.speed_sd_km_per_h": 2.0,
+        "units.0.levelling_deg": [0.1, 0.3],
+        "units.0.angles_deg.2": 4.0,
+        "units.0.position_m": [1.0, 2.0, 3.0],
+    }
+    changed = edited(FOUND, moved)
+    assert (
+        changed
+        == """[entry]
+speed_km_per_h = 57.1            # set by hand; was 57.090, found: in the record, km/h
+speed_sd_km_per_h = 2.0            # own words
+
+[[units]]
+# found: at rest its z points up,
+# which is roll and pitch
+levelling_deg = [0.1, 0.3]  # set by hand; was [0.10, 0.2]
+angles_deg = [1.0, 2.0, 4.0]  # set by hand; was [1.0, 2.0, 3.0], assumed: it looks ahead
+position_m = [1.0, 2.0, 3.0]  # found: the record says 'floor'; only you know: m
+"""
+    )
+    # Once more: what it was stays what was found, which the check tells.
+    again = edited(changed, {"entry.speed_km_per_h": 60, "units.0.angles_deg": [9, 9, 9]})
+    assert "= 60            # set by hand; was 57.090, found: in the record, km/h" in again
+    assert "= [9, 9, 9]  # set by hand; was [1.0, 2.0, 3.0], assumed: it looks ahead" in again
+    # The same number without a point is no change.
+    assert edited(again, {"entry.speed_km_per_h": 60.0}) == again
+
+
+def test_the_former_value_brings_the_former_line_back():
+    there = {"entry.speed_km_per_h": 60, "units.0.levelling_deg": [1, 2], "units.0.angles_deg": [0]}
+    back = {
+        "entry.speed_km_per_h": 57.09,
+        "units.0.levelling_deg": [0.1, 0.2],
+        "units.0.angles_deg": [1, 2, 3],
+    }
+    assert edited(edited(FOUND, there), back) == FOUND
+
+
+def test_a_check_tells_what_was_found_before(folder):
+    there = {"entry.speed_km_per_h": 60, "units.0.angles_deg": [0, 0, 0]}
+    found = check(folder, "crash", FOUND, there)
+    was = {"entry.speed_km_per_h": 57.09, "units.0.angles_deg": [1.0, 2.0, 3.0]}
+    assert found["was"] == was
+    assert check(folder, "crash", FOUND, {})["was"] == {}
+
+
 def test_a_value_is_added_removed_and_set_in_a_list():
     changed = edited(
         TEXT,

@@ -14,7 +14,7 @@ from tests.map_files import mbtiles, pmtiles, png
 from strapdown.errors import ConfigError
 from strapdown.studio import app as studio_app
 from strapdown.studio import server
-from strapdown.studio.live_jobs import PROTOCOLS, live_command
+from strapdown.studio.live_jobs import PORT, PROTOCOLS, live_command, live_info
 from strapdown.studio.samples import SAMPLES
 
 
@@ -105,6 +105,27 @@ def test_a_live_run_navigates_by_a_configuration_of_the_folder(tmp_path):
     ):
         with pytest.raises(ConfigError):
             live_command(tmp_path, "walk", "udp", {"run": name})
+
+
+def test_only_configurations_of_a_navigation_are_offered(tmp_path):
+    found = {
+        "run.toml": RUN,
+        "case.toml": '[vehicle]\nname = "a car"\n',
+        "open.toml": RUN.replace("45.0", '"?"'),
+        "none.toml": "= 3",
+        "run.csv": RUN,
+    }
+    for name, text in found.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    (tmp_path / "inside").mkdir()
+    (tmp_path / "inside" / "run.toml").write_text(RUN, encoding="utf-8")
+    assert live_info(tmp_path)["configurations"] == ["run.toml"]
+
+
+def test_an_address_for_phones_is_offered_beside_that_of_this_machine():
+    (field,) = [f for f in PROTOCOLS["sensor-logger"].fields if f.flag == "--listen"]
+    assert [place for place, _ in field.places] == [f"127.0.0.1:{PORT}", f"0.0.0.0:{PORT}"]
+    assert field.default == f"127.0.0.1:{PORT}"
 
 
 def test_commands_of_live_runs(tmp_path):

@@ -85,6 +85,33 @@ def test_an_attitude_is_that_of_the_command(fresh, tmp_path):
     assert fresh.ask("POST", "api/jobs", again).code == "studio.run-exists"
 
 
+def test_the_reference_of_an_attitude_is_drawn_beside_its_algorithms(fresh):
+    """At the instants of the algorithms, from the copies in the result alone."""
+    turning_log(fresh.folder / "log.csv")
+    time_s = np.arange(2.0, 15.0, 0.1)
+    heading = 20.0 * (np.cos(5.0) - np.cos(time_s)) * (time_s > 5.0)
+    rows = np.column_stack([time_s, 0 * heading, 0 * heading, heading])
+    head = "time_s,roll_deg,pitch_deg,heading_deg"
+    np.savetxt(fresh.folder / "truth.csv", rows, "%.9g", ",", header=head, comments="")
+    for name, more in (("with", " --reference truth.csv"), ("without", "")):
+        line = f"strapdown attitude log.csv --algorithms quaternion --no-report --out {name}{more}"
+        by_command_line(fresh.folder, line)
+    (fresh.folder / "truth.csv").unlink()
+    columns = "reference heading_deg,quaternion heading_deg"
+    asked = f"series?columns={quote(columns)}&width=2000"
+    told = fresh.ask("GET", f"api/runs/with/{asked}").json
+    high = {name: np.array(one["high"], dtype=float) for name, one in told["columns"].items()}
+    known, t = high["reference heading_deg"], np.array(told["t"])
+    inside = (t > 2.1) & (t < 14.8)
+    wanted = np.interp(t[inside], time_s, heading)
+    off = (known[inside] - wanted + 180.0) % 360.0 - 180.0
+    assert np.abs(off).max() < 0.05 and np.abs(wanted).max() > 10.0
+    assert np.isnan(known[t < 1.9]).all() and np.isnan(known[t > 15.1]).all()
+    assert (
+        "reference heading_deg" not in fresh.ask("GET", "api/runs/without/series").json["columns"]
+    )
+
+
 def test_a_session_of_a_live_run_is_a_log(fresh):
     session = fresh.folder / "walk" / "phone-1"
     session.mkdir(parents=True)
@@ -289,6 +316,25 @@ def test_a_result_is_told_as_people_read_it(tmp_path, monkeypatch):
     (heading,) = [row for row in both["numbers"] if row["quantity"] == "heading"]
     assert heading["shown"]["values"] == ["63.8", "71.5"] and not heading["detail"]
     assert heading["shown"]["differences"][1] == "+7.7" and heading["within"][1] is False
+
+
+def test_the_reasons_against_a_result_stand_beside_its_verdict(tmp_path):
+    """Those of the verdict, in the studio's words, among what was noticed once each."""
+    spec = {"log": {"repair": False}, "coarse": {"duration_s": 60.0}}
+    whole = {"name": "a", "alignment": spec}
+    axes = Finding("io.axes-not-stated", severity="warning").plain()
+    unseen = Finding("navigation.nothing-observed", severity="warning").plain()
+    for_it = Finding("navigation.outage-test-passed", severity="note").plain()
+    trust = {"verdict": "reserve", "for": [for_it], "against": [unseen, axes]}
+    place = tmp_path / "a"
+    with write_bundle(place, command="align", configuration=whole, inputs=(), seals=[]) as staging:
+        write_json(staging / "align.json", {"coarse": {}, "findings": [axes], "trust": trust})
+    found = runs.run(tmp_path, "a")
+    assert found["verdict"] == "reserve"
+    codes = ["navigation.nothing-observed", "io.axes-not-stated"]
+    assert [one["code"] for one in found["against"]] == codes
+    assert [one["code"] for one in found["findings"]] == codes
+    assert "--" not in found["against"][1]["remedy"]
 
 
 def test_a_finding_that_is_not_known_is_in_the_words_of_its_result():

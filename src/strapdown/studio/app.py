@@ -323,9 +323,9 @@ def refuse_taken(studio: Studio, name: str, words: list[str]) -> None:
         raise ConfigError("studio.run-exists", name=name)
 
 
-async def live(_: Studio, __: Request) -> Response:
+async def live(studio: Studio, _: Request) -> Response:
     """Who may send samples."""
-    return JSONResponse(live_info())
+    return JSONResponse(await run_in_threadpool(live_info, studio.folder.path))
 
 
 def write_configuration(studio: Studio, name: str, text: str, words: list[str]) -> str:

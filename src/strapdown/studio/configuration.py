@@ -8,6 +8,7 @@ which `command_of` makes the options.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -99,8 +100,8 @@ def check(
     Returns
     -------
     dict
-        ``toml``; ``values`` by key path, as they are written; ``errors``: line, key, path, text and
-        remedy.
+        ``toml``; ``values`` by key path, as they are written; ``was``: those that were found before
+        they were set by hand; ``errors``: line, key, path, text and remedy.
     """
     one = _kind(kind)
     text = edited(toml, changes)
@@ -108,13 +109,14 @@ def check(
     try:
         table = parse_toml(_path(folder, name), text).table
     except ConfigError as error:
-        return {"toml": text, "values": {}, "errors": list(_faults(error.finding, {}))}
+        faults = list(_faults(error.finding, {}))
+        return {"toml": text, "values": {}, "was": {}, "errors": faults}
     try:
         checked(folder, one, text, name)
     except ConfigError as error:
         errors = list(_faults(error.finding, key_lines(text)))
     values = {dotted(path): value for path, value in _flat(table, ())}
-    return {"toml": text, "values": values, "errors": errors}
+    return {"toml": text, "values": values, "was": _found_before(text), "errors": errors}
 
 
 def dotted(path: KeyPath) -> str:
@@ -180,6 +182,12 @@ def edited(text: str, changes: Mapping[str, Any]) -> str:
     changes : mapping of str to object
         By key path, ``aiding.gnss.lever_arm_m`` or ``units.0.position_m``; None removes the key.
 
+    Notes
+    -----
+    A comment that says how a value was found or assumed is no longer true of another value: it
+    then says that the value was set by hand, and what it was. With its former value the former
+    line returns.
+
     Raises
     ------
     ConfigError
@@ -195,11 +203,124 @@ def edited(text: str, changes: Mapping[str, Any]) -> str:
     try:
         document = tomlkit.parse(text)
         for place, value in changes.items():
-            _change(document, place, value, tomlkit.table)
+            _set_by_hand(document, place, value, text)
         return tomlkit.dumps(document)
     except (TOMLKitError, RecursionError, ValueError, TypeError) as error:
         reason = str(error)[:200] or type(error).__name__
         raise ConfigError("studio.not-changed", reason=reason) from None
+
+
+#: How a proposal begins the remark beside a value that it found, or above it.
+GROUNDS = re.compile(r"# *(?:found|assumed): ")
+#: The remark beside a value that was set by hand: what it was, as TOML, and its former remark.
+BY_HAND = re.compile(r"# set by hand; was (?P<was>.+?)(?:, (?P<remark>(?:found|assumed): .*))?$")
+#: Part of a remark on a value that nothing but a person can state.
+OWN = "only you know"
+
+
+def _set_by_hand(document: Any, place: str, value: Any, text: str) -> None:
+    """Set or remove one value of a document, and keep the remark beside it true."""
+    before = _item(document, place)
+    literal = "" if before is None else before.as_string().strip()
+    if before is not None and value is not None and _equal(_plain(document, place), value):
+        return
+    _change(document, place, value, tomlkit.table)
+    after = _item(document, place)
+    if before is None or after is None:
+        return
+    remark, former = after.trivia.comment, BY_HAND.match(before.trivia.comment)
+    if former is not None:
+        was = _literal(former["was"])
+        if was is None or not _equal(was.unwrap(), after.unwrap()):
+            return
+        owner, key = _owner(document, place)
+        trivia = after.trivia
+        owner[key] = was
+        again = owner.item(key) if hasattr(owner, "item") else owner[key]
+        again.trivia.comment = f"# {former['remark']}" if former["remark"] else ""
+        again.trivia.comment_ws = trivia.comment_ws if former["remark"] else ""
+    elif "?" in literal or OWN in remark or "\n" in literal:
+        return  # An answer, which nothing was known of.
+    elif GROUNDS.match(remark):
+        after.trivia.comment = f"# set by hand; was {literal}, {remark.lstrip('# ')}"
+    elif not remark and _grounds_above(text, place):
+        after.trivia.comment_ws, after.trivia.comment = "  ", f"# set by hand; was {literal}"
+
+
+def _owner(document: Any, place: str) -> tuple[Any, str | int]:
+    """Return the table that holds the value of a place, and its key there.
+
+    A number of a list has no remark of its own: then the list is meant.
+    """
+    parts = [_part(part) for part in place.split(".")]
+    while isinstance(parts[-1], int) and len(parts) > 1:
+        parts.pop()
+    node = document
+    for part in parts[:-1]:
+        node = node[part]
+    return node, parts[-1]
+
+
+def _item(document: Any, place: str) -> Any:
+    """Return the value of a place with its remark; None: there is none, or it is a table."""
+    try:
+        owner, key = _owner(document, place)
+        found = owner.item(key) if hasattr(owner, "item") else owner[key]
+    except (KeyError, IndexError, TypeError, TOMLKitError):
+        return None
+    return None if isinstance(found, dict) or not hasattr(found, "trivia") else found
+
+
+def _plain(document: Any, place: str) -> Any:
+    """Return the value of a place, itself a number of a list, or None."""
+    node = document
+    try:
+        for part in place.split("."):
+            node = node[_part(part)]
+    except (KeyError, IndexError, TypeError):
+        return None
+    return node.unwrap() if hasattr(node, "unwrap") else node
+
+
+def _equal(one: Any, other: Any) -> bool:
+    """Whether two values are the same; a number may be written with a point or without."""
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(_equal, one, other))
+    return isinstance(one, bool) == isinstance(other, bool) and bool(one == other)
+
+
+def _literal(text: str) -> Any:
+    """Return a value as it is written; None: it is none."""
+    try:
+        return tomlkit.value(text)
+    except (TOMLKitError, ValueError):
+        return None
+
+
+def _grounds_above(text: str, place: str) -> bool:
+    """Whether the comment right above a value says how it was found or assumed."""
+    lines = text.split("\n")
+    numbers = {dotted(path): found for path, found in key_lines(text).items()}.get(place, ())
+    for k in range(min(numbers, default=1) - 2, -1, -1):
+        if not lines[k].startswith("#"):
+            break
+        if GROUNDS.match(lines[k]):
+            return True
+    return False
+
+
+def _found_before(text: str) -> dict[str, Any]:
+    """Return the values that were found before others were set by hand, by key path."""
+    lines = text.split("\n")
+    found: dict[str, Any] = {}
+    for path, numbers in key_lines(text).items():
+        if not numbers or not path or isinstance(path[-1], int):
+            continue
+        former = BY_HAND.search(lines[numbers[0] - 1])
+        was = None if former is None else _literal(former["was"])
+        if was is not None:
+            found[dotted(path)] = was.unwrap()
+    return found
 
 
 def _change(document: Any, place: str, value: Any, new: Callable[[], Any]) -> None:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.toml_file import read_toml
-from strapdown.errors import ConfigError, Finding, check_choice, printable
-from strapdown.studio.configuration import refuse_outside
+from strapdown.errors import ConfigError, Finding, StrapdownError, check_choice, printable
+from strapdown.studio.configuration import LONGEST, refuse_outside
 from strapdown.studio.folder import Folder
 
 __all__ = ["PROTOCOLS", "live_command", "live_info"]
@@ -28,6 +29,8 @@ class LiveField:
     kind: str = "text"
     choices: tuple[str, ...] = ()
     unit: str = ""
+    #: Addresses to choose from, and who reaches them; another one may be written.
+    places: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -39,12 +42,21 @@ class Protocol:
     fields: tuple[LiveField, ...]
 
 
+#: Port of each address that is offered: an app of a phone keeps it.
+PORT = 8437
+#: Configurations that are offered.
+MOST = 100
+
 _AT = LiveField(
     "--listen",
     "Address",
     "HOST:PORT of this machine; 127.0.0.1 is for this machine alone, 0.0.0.0 for phones in your "
     "network",
-    "127.0.0.1:8437",
+    f"127.0.0.1:{PORT}",
+    places=(
+        (f"127.0.0.1:{PORT}", "Programs on this computer alone"),
+        (f"0.0.0.0:{PORT}", "Phones in the same network, too"),
+    ),
 )
 _EVERY = LiveField(
     "--every", "Interval of states", "least time between two", "0.1", "number", (), "s"
@@ -100,8 +112,12 @@ PROTOCOLS = {
 }
 
 
-def live_info() -> dict[str, Any]:
-    """Return the protocols with their fields."""
+def live_info(folder: Path) -> dict[str, Any]:
+    """Return the protocols with their fields, and the configurations to navigate by.
+
+    ``configurations``: files right in the folder that are the configuration of a navigation,
+    without open values.
+    """
     return {
         "protocols": [
             {
@@ -117,14 +133,25 @@ def live_info() -> dict[str, Any]:
                         "choices": list(field.choices),
                         "default": field.default,
                         "help": field.help,
+                        "places": [list(one) for one in field.places],
                     }
                     for field in one.fields
                 ],
             }
             for name, one in PROTOCOLS.items()
         ],
+        "configurations": list(_navigations(Folder(folder))),
         "warning": Finding("studio.live-open").sentence("studio"),
     }
+
+
+def _navigations(folder: Folder) -> Iterator[str]:
+    """Yield the names of files by which a live run can navigate."""
+    names = sorted(p.name for p in folder.path.iterdir() if p.name.lower().endswith(".toml"))
+    for name in names[:MOST]:
+        with suppress(StrapdownError, OSError, ValueError):
+            if (folder.path / name).stat().st_size <= LONGEST:
+                yield _configuration(folder, name)
 
 
 def live_command(folder: Path, name: str, protocol: str, options: Mapping[str, Any]) -> list[str]:

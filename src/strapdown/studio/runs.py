@@ -23,13 +23,21 @@ import numpy as np
 import pandas as pd
 
 from strapdown import rotation
-from strapdown.bundle import MANIFEST, SIGNATURE_FILE, UNSEALED, read_manifest, sha256
+from strapdown.bundle import (
+    MANIFEST,
+    SIGNATURE_FILE,
+    UNSEALED,
+    named_paths,
+    read_manifest,
+    resolved,
+    sha256,
+)
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.studio.folder import Folder
 from strapdown.studio.kinds import KINDS
 from strapdown.studio.look import kept_stream
-from strapdown.studio.pyramid import LIST
-from strapdown.tables.checks import index_of
+from strapdown.studio.pyramid import LIST, Array
+from strapdown.tables.checks import find_gaps, index_of
 
 if TYPE_CHECKING:
     from strapdown.report.compare_folders import SealedRun
@@ -138,6 +146,9 @@ def run(folder: Path, name: str) -> dict[str, Any]:
     from strapdown.report.compare_folders import open_run
 
     has, sealed = {str(one["name"]) for one in manifest["outputs"]}, open_run(place, place.name)
+    against = [_finding(one) for one in _list(answer.get("trust"), "against")[:MOST]]
+    noticed = [_finding(one) for one in _list(answer, "findings")[:MOST]]
+    said = {(one["code"], one["text"]) for one in noticed}
     return {
         **summary(folder, name),
         **span,
@@ -150,7 +161,9 @@ def run(folder: Path, name: str) -> dict[str, Any]:
         ],
         # Without a heading the path of a crash is along the axes of the vehicle at its entry.
         "over_ground": manifest["command"] != "crash" or is_over_ground(answer),
-        "findings": [_finding(one) for one in _list(answer, "findings")[:MOST]],
+        # Why the verdict is not the best one; a reason is noticed, too, and once.
+        "against": against,
+        "findings": [one for one in against if (one["code"], one["text"]) not in said] + noticed,
         "versions": manifest["versions"],
         "command_line": _repeating(manifest, name),
         "report": f"runs/{name}/report.html" if "report.html" in has else None,
@@ -339,7 +352,43 @@ def _table(place: Path, manifest: Mapping[str, Any]) -> pd.DataFrame:
         at = np.where(stamps - time[at - 1] < time[at] - stamps, at - 1, at)
         for column in sd.columns:
             table[column] = sd[column].to_numpy()[at]
+    if manifest["command"] == "attitude":
+        for angle, values in _known_attitude(place, manifest, index_of(table)).items():
+            table[f"reference {angle}_deg"] = values
     return table
+
+
+def _known_attitude(place: Path, manifest: Mapping[str, Any], time: Array) -> dict[str, Array]:
+    """Return the attitude that a run was compared with at instants, (n,), s, by angle, deg.
+
+    NaN where it is not known; empty without one, or if it is not in the folder of the result.
+    """
+    answer = _answer(place, manifest)
+    scores = [s for one in _list(answer, "algorithms") for s in _list(one, "scores")]
+    if all(_word(one, "against") != "truth" for one in scores):
+        return {}
+    from strapdown.attitude_comparison.options import AttitudeSpec
+    from strapdown.attitude_comparison.source import read_source, with_truth
+    from strapdown.evaluation.differences import attitude_at
+    from strapdown.tables import EULER, QUATERNION
+
+    stated = {k: v for k, v in manifest["configuration"].items() if k != "report"}
+    # What a manifest names elsewhere is not read.
+    if any(not (place / p).resolve().is_relative_to(place.resolve()) for p in named_paths(stated)):
+        return {}
+    with suppress(StrapdownError, OSError, ValueError):
+        spec = AttitudeSpec.model_validate(resolved(stated, place))
+        source = with_truth(read_source(spec), spec)
+        if source.truth is None or source.scored is None:
+            return {}
+        known = source.truth[np.asarray(source.scored, dtype=bool)][QUATERNION]
+        stamps = index_of(known)
+        angles = rotation.euler_from_quaternion(attitude_at(known, time))
+        angles[(time < stamps[0]) | (time > stamps[-1])] = np.nan
+        for gap in find_gaps(stamps):
+            angles[(time > gap.start) & (time < gap.end)] = np.nan
+        return dict(zip(EULER, angles.T, strict=True))
+    return {}
 
 
 def _read(path: Path) -> pd.DataFrame:
