@@ -131,9 +131,16 @@ function Contents({ look }: { look: Look }) {
       })} />
     <dl class="facts">
       {look.logs.map((log) => <Facts key={log.name} log={log} alone={look.logs.length === 1} />)}
-      {look.streams.some((s) => s.name === "imu") && <><dt>Rests</dt><dd>{look.rests.length ? `${plural(look.rests.length, "stretch", "stretches")}, the longest ${duration(Math.max(...look.rests.map(([a, b]) => b - a)))}` : "none found: it moved all the time"}</dd></>}
+      {look.streams.filter((s) => s.name === "imu").map((s) => <><dt>Rests{look.logs.length > 1 ? ` of ${s.file}` : ""}</dt><dd>{restsOf(s)}</dd></>)}
     </dl>
   </>;
+}
+
+/** Rests of a stream in words; what neither turns nor shakes may move evenly. */
+function restsOf({ rests = [], steady = [] }: Stream): string {
+  const said = (spans: Span[]) => `${plural(spans.length, "stretch", "stretches")}, the longest ${duration(Math.max(...spans.map(([a, b]) => b - a)))}`;
+  const moving = steady.length ? `steady, at rest or moving evenly: ${said(steady)}` : "";
+  return [rests.length ? said(rests) : "none found", moving || (rests.length ? "" : "it moved all the time")].filter(Boolean).join("; ");
 }
 
 function Facts({ log, alone }: { log: LogFound; alone: boolean }) {
@@ -191,7 +198,7 @@ function Signals({ look, streams, imu, reading }: { look: Look; streams: Stream[
   const shown = useMemo(() => name === ALL && crash.length ? crash : [streams.find((s) => keyOf(s) === name) ?? imu], [name, streams]);
   const whole = useMemo<Span>(() => spanOf(shown), [shown]);
   const several = new Set(shown.map((s) => s.file)).size > 1;
-  const all = useMemo(() => shown.flatMap((s) => panelsOf(s).map((p) => ({ ...p, source: keyOf(s), title: several && s.file ? `${p.title} (${s.file})` : p.title }))), [shown]);
+  const all = useMemo(() => shown.flatMap((s) => panelsOf(s).map((p) => ({ ...p, source: keyOf(s), rests: s.rests ?? [], steady: s.steady ?? [], gaps: s.gaps ?? [], title: several && s.file ? `${p.title} (${s.file})` : p.title }))), [shown]);
   const chosen = picked ?? all.slice(0, SHOWN).map((p) => p.title);
   const panels = useMemo(() => all.length > SHOWN ? all.filter((p) => chosen.includes(p.title)) : all, [all, chosen.join("|")]);
   const trim: Span = work.trim ?? [imu.from_s, imu.to_s];
@@ -216,8 +223,8 @@ function Signals({ look, streams, imu, reading }: { look: Look; streams: Stream[
     </fieldset></More>}
     {shown.some(ofCrash) && <p class="soft">As the files state them: in SI where the unit is known, at the time of each file, not yet turned into the axes of the vehicle.</p>}
     <Traces panels={panels} whole={whole} askKey={JSON.stringify([reading, name])} cursor={cursor} onCursor={setCursor} ask={ask}
-      trim={trims ? work.trim : null} marks={work.marks} rests={look.rests} gaps={look.gaps} {...(trims ? { onTrim: setTrim } : {})} onMark={(t) => addMark(t)} />
-    <p class="legend"><span><i class="area rest" />at rest</span><span><i class="area gap" />gap</span>{trims && <span><i class="area away" />not used</span>}</p>
+      trim={trims ? work.trim : null} marks={work.marks} {...(trims ? { onTrim: setTrim } : {})} onMark={(t) => addMark(t)} />
+    <p class="legend">{shown.some((s) => s.rests?.length) && <span><i class="area rest" />at rest</span>}{shown.some((s) => s.steady?.length) && <span><i class="area steady" />steady: at rest, or moving evenly</span>}<span><i class="area gap" />gap</span>{trims && <span><i class="area away" />not used</span>}</p>
     {trims && <Trim whole={[imu.from_s, imu.to_s]} trim={trim} onTrim={setTrim} look={look} />}
     <h3>Reference points</h3>
     <p class="help">Instants to find again: the impact, a stop, a turn. Put the cursor there first.</p>

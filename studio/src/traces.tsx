@@ -12,6 +12,8 @@ export interface Panel {
   title: string; unit: string; columns: { name: string; label: string }[];
   /** Which stream it is of, where several are shown under one cursor. */
   source?: string;
+  /** Stretches of its sensor, on its clock. */
+  rests?: Span[]; steady?: Span[]; gaps?: Span[];
 }
 
 export type Ask = (columns: string[], view: Span, width: number, signal: AbortSignal, source: string) => Promise<Series>;
@@ -27,7 +29,7 @@ const HEIGHT = 180;
 interface Props {
   panels: Panel[]; ask: Ask; whole: Span; askKey: string;
   cursor: number | null; onCursor: (t: number | null) => void;
-  trim?: Span | null; marks?: { label: string; t: number }[]; rests?: Span[]; gaps?: Span[];
+  trim?: Span | null; marks?: { label: string; t: number }[];
   onMark?: (t: number) => void; onTrim?: (trim: Span) => void;
 }
 
@@ -215,7 +217,7 @@ function OnePanel(props: Props & {
 
   useEffect(() => { chart.current?.setSize({ width, height: HEIGHT }); }, [width]);
   useEffect(() => { chart.current?.setData(data, true); }, [data]);
-  useEffect(() => { chart.current?.redraw(false, false); }, [view, props.trim, props.marks, props.rests]);
+  useEffect(() => { chart.current?.redraw(false, false); }, [view, props.trim, props.marks]);
   useEffect(() => {
     const u = chart.current;
     if (!u) return;
@@ -230,7 +232,7 @@ function OnePanel(props: Props & {
   </div>;
 }
 
-function shade(u: uPlot, props: Props) {
+function shade(u: uPlot, props: Props & { panel: Panel }) {
   const { ctx, bbox } = u;
   const area = (from: number, to: number, fill: string) => {
     const left = Math.max(bbox.left, u.valToPos(from, "x", true));
@@ -240,8 +242,9 @@ function shade(u: uPlot, props: Props) {
     ctx.fillRect(left, bbox.top, Math.max(1, right - left), bbox.height);
   };
   ctx.save();
-  for (const [from, to] of props.rests ?? []) area(from, to, color("--rest"));
-  for (const [from, to] of props.gaps ?? []) area(from, to, color("--gap"));
+  for (const [from, to] of props.panel.rests ?? []) area(from, to, color("--rest"));
+  for (const [from, to] of props.panel.steady ?? []) area(from, to, color("--steady"));
+  for (const [from, to] of props.panel.gaps ?? []) area(from, to, color("--gap"));
   if (props.trim) {
     area(props.whole[0], props.trim[0], color("--away"));
     area(props.trim[1], props.whole[1], color("--away"));

@@ -48,6 +48,8 @@ export interface Column {
 export interface Stream {
   file?: string; name: string; rows: number; rate_hz?: number | null; from_s: number; to_s: number;
   columns: Column[];
+  /** Of the samples of its file, on its clock; steady: at rest, or moving evenly. */
+  rests?: Span[]; steady?: Span[]; gaps?: Span[];
 }
 
 export type Span = [number, number];

@@ -477,3 +477,34 @@ def test_every_help_is_that_of_a_field():
     assert set(helps["path"]) <= known
     endings = {".".join(path.split(".")[-n:]) for path in known for n in (1, 2)}
     assert set(helps["name"]) <= endings
+
+
+def test_stretches_are_of_the_samples_of_their_own_file(folder):
+    rows = np.loadtxt(folder / "log.csv", delimiter=",", skiprows=1)
+    head = (folder / "log.csv").read_text().partition("\n")[0]
+
+    def written(name, shift, push):
+        other = rows.copy()
+        other[:, 0] += shift
+        other[:, 4] += push
+        np.savetxt(folder / name, other, "%.9g", ",", header=head, comments="")
+
+    written("late.csv", 5.0, 0.0)
+    written("pushed.csv", 0.0, 4.0)
+    found = look(folder, ["log.csv", "late.csv", "pushed.csv"], {}, "forward-right-down")
+    spans = {s["file"]: (s["rests"], s["steady"]) for s in found["streams"]}
+    (rest,) = spans["log.csv"][0]
+    assert rest == pytest.approx([0.0, 20.0], abs=1.0) and not spans["log.csv"][1]
+    assert spans["late.csv"][0] == [pytest.approx([rest[0] + 5.0, rest[1] + 5.0])]
+    # A steady acceleration of 4 m/s² neither turns nor shakes, and is no rest.
+    assert spans["pushed.csv"] == ([], [pytest.approx(rest)])
+    assert found["rests"] == [rest] and found["steady"] == []
+
+
+def test_what_is_steady_before_an_impact_may_be_a_drive(folder):
+    rows = np.loadtxt(folder / "log.csv", delimiter=",", skiprows=1)
+    head = (folder / "log.csv").read_text().partition("\n")[0]
+    rows[:, 4] -= 100.0 * ((rows[:, 0] > 30.0) & (rows[:, 0] < 30.1))
+    np.savetxt(folder / "hit.csv", rows, "%.9g", ",", header=head, comments="")
+    found = look(folder, ["hit.csv"], {}, "forward-right-down")
+    assert found["rests"] == [] and found["steady"]
