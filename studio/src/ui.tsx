@@ -125,7 +125,7 @@ export function Ask({ question, onAnswer, list, take }: { question: Question; on
     onAnswer({ [question.key]: value });
   };
   return <div class="ask" role="group" aria-labelledby={id} ref={own} tabIndex={-1}>
-    <p id={id}>{sentence(question.text)}{question.line ? <span class="soft"> (line {question.line})</span> : null}</p>
+    <p id={id}>{sentence(question.text)}</p>
     {question.remedy && <p class="help">{sentence(question.remedy)}</p>}
     {question.choices.length > 0 && <div class="row">
       {question.choices.map((choice: Choice) => <button type="button" key={choice.label} onClick={() => onAnswer(choice.set)}>{choice.label}{choice.likely ? " (likely)" : ""}</button>)}

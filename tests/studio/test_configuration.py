@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shlex
 import shutil
 import tomllib
@@ -499,6 +501,15 @@ def test_stretches_are_of_the_samples_of_their_own_file(folder):
     # A steady acceleration of 4 m/s² neither turns nor shakes, and is no rest.
     assert spans["pushed.csv"] == ([], [pytest.approx(rest)])
     assert found["rests"] == [rest] and found["steady"] == []
+
+
+def test_what_look_finds_names_no_option_of_the_command_line(folder):
+    found = look(folder, ["log.csv"], {})
+    # The options are for the command that the page shows.
+    del found["logs"][0]["options"]
+    said = json.dumps(found)
+    assert "io.sampling-taken-as-instantaneous" in said
+    assert not re.search(r"(?<![\w-])--[a-z]", said)
 
 
 def test_what_is_steady_before_an_impact_may_be_a_drive(folder):

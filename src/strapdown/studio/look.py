@@ -141,7 +141,7 @@ def look(
                 streams.append({**about, **stretches, **listed})
     first = next((k for k, one in enumerate(made.logs) if "imu" in one.streams), 0)
     found = {
-        **diagnosis_json(made),
+        **diagnosis_json(made, "studio"),
         "said": [headline(one) for one in made.logs],
         "uses": [{use: one.answer(use) for use in uses(one)} for one in made.logs],
         "findings": [told(f) for one in made.logs for f in (*one.faults, *one.notes)],
