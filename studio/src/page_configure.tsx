@@ -228,7 +228,7 @@ function openQuestions(checked: Checked | null, asked: Question[]): Question[] {
     const text = said?.text ?? fault?.text ?? key;
     return {
       code: OPEN, choices: [], free: "number", unit: null, ...said, key, text: typeof name === "string" && name && !text.includes(name) ? `${name}: ${text}` : text,
-      line: fault?.line ?? undefined, remedy: [said && fault ? sentence(fault.text) : "", PLACE.test(key) ? "Or drag its dot on the drawing of the vehicle below." : ""].filter(Boolean).join(" ") || null,
+      line: fault?.line ?? undefined, remedy: [said && fault?.text ? sentence(fault.text) : "", PLACE.test(key) ? "Or drag its dot on the drawing of the vehicle below." : ""].filter(Boolean).join(" ") || null,
     };
   });
 }

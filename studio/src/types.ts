@@ -58,7 +58,7 @@ export interface Fit { answer: string; reasons: Finding[] }
 
 export interface LogFound {
   name: string; format: { name: string; title: string } | null;
-  streams: { name: string; rows: number; rate_hz: number | null; from_s: number; to_s: number; gaps: number; lost_s: number; columns: string[]; clock?: string }[];
+  streams: { name: string; rows: number; rate_hz: number | null; from_s: number; to_s: number; gaps: number; lost_s: number; columns: string[]; clock?: string; clock_origin_s?: number }[];
   read_as: { source: string; quantity: string; unit: string | null; why: string }[];
   stationary: { from_s: number; to_s: number; grade: string }[];
   gravity: { included: boolean; median_m_per_s2: number; at_rest_m_per_s2: number | null } | null;

@@ -237,7 +237,7 @@ _CHOSEN = {"backtrack": "navigation begins with the first sample of that part"}
 _WANTED = {
     "heading_deg": "heading of the body at the start, clockwise from north (gyros that "
     "find north at a rest of a minute need none, if their sensor is named)",
-    "sd_deg": "how well it is known",
+    "sd_deg": "how well that heading is known, one standard deviation",
 }
 
 
