@@ -55,7 +55,7 @@ HEADERS = (".ev5", ".mme")
 #: Lists of what `look` finds.
 PARTS = (
     *("logs", "between", "said", "uses", "findings", "questions", "streams"),
-    *("rests", "steady", "gaps"),
+    *("rests", "gaps"),
 )
 #: Units of columns of the tables, by the name, or its beginning before ``_``.
 UNITS = {
@@ -89,13 +89,14 @@ def look(
     -------
     dict
         The JSON of `doctor`; ``questions``; ``streams``, each with the ``rests``, ``steady``
-        stretches and ``gaps`` of the samples of its file; those of the first log.
+        stretches and ``gaps`` of the samples of its file; ``rests``, steady ones too, and ``gaps``
+        of the first log.
     """
     from strapdown.api.doctor import doctor
     from strapdown.report.doctor import diagnosis_json, headline, uses
 
     place = Folder(folder)
-    paths = [place.file(name) for name in names]
+    paths = files_of_recorders([place.file(name) for name in names])
     if not paths:
         raise ConfigError("studio.nothing-named")
     keys = _reading(log)
@@ -150,10 +151,51 @@ def look(
             *_heights_of(made.between, by_name),
         ],
         "streams": streams,
-        **own_stretches[first],
+        # For what may be found out with them: with those that may be of a drive.
+        "rests": sorted(own_stretches[first]["rests"] + own_stretches[first]["steady"]),
+        "gaps": own_stretches[first]["gaps"],
     }
     _written(kept, found)
     _forget(_cache(place))
+    return found
+
+
+#: Why a folder is no recording: it has those of several sensors.
+SEVERAL = ("io.folder-of-recordings", "io.gyro-in-several-logs")
+
+
+def files_of_recorders(paths: Sequence[Path]) -> list[Path]:
+    """Return paths with the tables of a folder in its place, where they are of several recorders.
+
+    A folder is one recorder, whose tables are joined, unless two of them have a gyro.
+    """
+    return [one for path in paths for one in (_tables(path) if _of_several(path) else [path])]
+
+
+def _of_several(path: Path) -> bool:
+    """Whether it is a folder that is refused for the recordings of several sensors."""
+    from strapdown.formats import open_stream
+    from strapdown.formats.crash_records import stated_format
+
+    if not path.is_dir() or stated_format(path) is not None:
+        return False
+    try:
+        open_stream(path, "imu", None)
+    except StrapdownError as error:
+        return error.finding.code in SEVERAL
+    return False
+
+
+def _tables(folder: Path) -> list[Path]:
+    """List the tables of a folder that can be read as records of a crash, by name."""
+    from strapdown.formats.crash_records import read_crash_record
+
+    found = []
+    for path in sorted(folder.iterdir()):
+        if path.is_file() and not path.name.startswith("."):
+            with suppress(StrapdownError):
+                read_crash_record(path)
+                found.append(path)
     return found
 
 
