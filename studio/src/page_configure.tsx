@@ -11,7 +11,7 @@ import { Ask, Busy, Control, Copy, Empty, Findings, More, Page, Part, sentence, 
 import { Vehicle } from "./vehicle";
 
 /** What a proposal depends on: another one is offered when it changes. */
-const basis = (work: Work) => JSON.stringify([work.kind, work.files, work.log, work.axes, work.trim, work.places]);
+export const basis = (work: Work) => JSON.stringify([work.kind, work.files, work.log, work.axes, work.trim, work.places]);
 
 export function ConfigurePage() {
   const { work, state } = useShared();

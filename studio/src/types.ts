@@ -5,6 +5,8 @@ export interface StoredFile { name: string; bytes: number; modified: number | st
 export interface Run {
   name: string; command: string; title: string; made: number | string; digest: string;
   verdict: string | null;
+  /** Whether it holds a simulated crash with its case, which can be run. */
+  case?: boolean;
 }
 
 export type JobState = "waiting" | "running" | "done" | "failed" | "cancelled" | "lost";
