@@ -66,8 +66,8 @@ function inOneSentence(look: Look): string {
   return `${duration(imu.to_s - imu.from_s)} of ${what}${rateOf(look, imu) ? ` at ${number(rateOf(look, imu)!, 3)} Hz` : ""}${others.length ? `, with ${[...new Set(others)].join(", ")}` : ""}.`;
 }
 
-/** Files that are no logs of inertial samples, and can be read as records of a crash. */
-const recordsOf = (look: Look) => look.logs.filter((log) => !log.read_as.length && (log.fit["crash"]?.answer ?? "no") !== "no");
+/** Files that are no logs of inertial samples, fixes or a reference, and can be read as records of a crash. */
+const recordsOf = (look: Look) => look.logs.filter((log) => !log.read_as.length && !log.streams.length && (log.fit["crash"]?.answer ?? "no") !== "no");
 
 /** A stream of the channels of a crash. */
 const ofCrash = (s: Stream) => s.columns.some((c) => c.title !== undefined);
