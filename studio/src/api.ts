@@ -80,6 +80,12 @@ export const api = {
   begin: (body: Record<string, unknown>) => post<Job>("api/jobs", body),
   job: (id: string) => get<Job>(`api/jobs/${part(id)}`),
   cancel: (id: string) => send<Job>(`api/jobs/${part(id)}`, { method: "DELETE", headers: CHANGES }),
+  /** The case of a simulated crash, as text. */
+  caseOf: async (name: string): Promise<string> => {
+    const answer = await fetch(`runs/${part(name)}/case.toml`);
+    if (!answer.ok) throw new ServerError({ code: "studio.no-case", text: "the case cannot be read", remedy: null }, answer.status);
+    return answer.text();
+  },
   run: (name: string) => get<RunDetail>(`api/runs/${part(name)}`),
   track: (name: string) => get<Track>(`api/runs/${part(name)}/track?points=2000`),
   compare: (runs: string[]) => post<Comparison>("api/compare", { runs }),

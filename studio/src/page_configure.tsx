@@ -11,7 +11,7 @@ import { Ask, Busy, Control, Copy, Empty, Findings, More, Page, Part, sentence, 
 import { Vehicle } from "./vehicle";
 
 /** What a proposal depends on: another one is offered when it changes. */
-const basis = (work: Work) => JSON.stringify([work.kind, work.files, work.log, work.axes, work.trim, work.places]);
+export const basis = (work: Work) => JSON.stringify([work.kind, work.files, work.log, work.axes, work.trim, work.places]);
 
 export function ConfigurePage() {
   const { work, state } = useShared();
@@ -230,7 +230,7 @@ function openQuestions(checked: Checked | null, asked: Question[]): Question[] {
     const text = said?.text ?? fault?.text ?? key;
     return {
       code: OPEN, choices: [], free: "number", unit: null, ...said, key, text: typeof name === "string" && name && !text.includes(name) ? `${name}: ${text}` : text,
-      line: fault?.line ?? undefined, remedy: [said && fault ? sentence(fault.text) : "", PLACE.test(key) ? "Or drag its dot on the drawing of the vehicle below." : ""].filter(Boolean).join(" ") || null,
+      line: fault?.line ?? undefined, remedy: [said && fault?.text ? sentence(fault.text) : "", PLACE.test(key) ? "Or drag its dot on the drawing of the vehicle below." : ""].filter(Boolean).join(" ") || null,
     };
   });
 }

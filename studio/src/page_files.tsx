@@ -4,7 +4,8 @@ import { Fragment } from "preact";
 import { useRef, useState } from "preact/hooks";
 import { api, problemOf, ServerError } from "./api";
 import { bytes, date, plural } from "./format";
-import { newWork, refresh, useShared } from "./store";
+import { basis } from "./page_configure";
+import { newWork, now, refresh, setWork, useShared } from "./store";
 import type { Problem, Sample } from "./types";
 import { Empty, More, Page, Part, Trouble } from "./ui";
 
@@ -54,6 +55,24 @@ export function FilesPage() {
       const { files: names } = await api.sample(one);
       await refresh();
       setChosen(names);
+    } catch (error) {
+      setProblem(problemOf(error));
+    }
+  };
+  /** Set up the case of a simulated crash; its records are in the folder of the case. */
+  const runCase = async (name: string) => {
+    setProblem(null);
+    try {
+      const toml = await api.caseOf(name);
+      const { values } = await api.check({ kind: "crash", toml });
+      const set: Record<string, unknown> = {};
+      for (const [key, value] of Object.entries(values)) {
+        if (/(^|\.)path$/.test(key) && typeof value === "string") set[key] = `${name}/${value}`;
+      }
+      newWork([...new Set(Object.values(set).map(String))]);
+      setWork({ kind: "crash", toml: (await api.check({ kind: "crash", toml, set })).toml, name: `${name}-crash` });
+      setWork({ proposedFor: basis(now().work) });
+      location.hash = "#/configure";
     } catch (error) {
       setProblem(problemOf(error));
     }
@@ -112,7 +131,7 @@ export function FilesPage() {
       {!state?.runs.length ? <Empty>There is no result yet. Each run leaves one, sealed, in the folder.</Empty>
         : <ul class="list">{state.runs.map((run) => <li key={run.name} class="item">
           <a class="name" href={`#/result/${encodeURIComponent(run.name)}`}>{run.title || run.name}</a>
-          <span class="soft">{run.title && run.title !== run.name ? run.name : ""}</span><span class="soft">{run.command}</span><span class="soft when">{date(run.made)}</span>
+          <span class="soft">{run.title && run.title !== run.name ? run.name : ""}</span><span class="soft">{run.command}</span>{run.case && <button type="button" onClick={() => void runCase(run.name)}>Run its case</button>}<span class="soft when">{date(run.made)}</span>
         </li>)}</ul>}
     </Part>
   </Page>;

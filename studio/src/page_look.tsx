@@ -61,12 +61,13 @@ function inOneSentence(look: Look): string {
   }
   const imu = look.streams.find((s) => s.name === "imu") ?? look.streams[0];
   if (!imu) return "No stream of samples was found in these files.";
+  const what = imu.name === "imu" ? "inertial samples" : wordsOf(imu);
   const others = look.streams.filter((s) => s !== imu).map((s) => WORDS[s.name] ?? s.name);
-  return `${duration(imu.to_s - imu.from_s)} of inertial samples${rateOf(look, imu) ? ` at ${number(rateOf(look, imu)!, 3)} Hz` : ""}${others.length ? `, with ${[...new Set(others)].join(", ")}` : ""}.`;
+  return `${duration(imu.to_s - imu.from_s)} of ${what}${rateOf(look, imu) ? ` at ${number(rateOf(look, imu)!, 3)} Hz` : ""}${others.length ? `, with ${[...new Set(others)].join(", ")}` : ""}.`;
 }
 
-/** Files that are no logs of inertial samples, and can be read as records of a crash. */
-const recordsOf = (look: Look) => look.logs.filter((log) => !log.read_as.length && (log.fit["crash"]?.answer ?? "no") !== "no");
+/** Files that are no logs of inertial samples, fixes or a reference, and can be read as records of a crash. */
+const recordsOf = (look: Look) => look.logs.filter((log) => !log.read_as.length && !log.streams.length && (log.fit["crash"]?.answer ?? "no") !== "no");
 
 /** A stream of the channels of a crash. */
 const ofCrash = (s: Stream) => s.columns.some((c) => c.title !== undefined);
@@ -77,6 +78,23 @@ const certain = (s: Stream) => s.columns.some((c) => c.title !== undefined && c.
 const spanOf = (streams: Stream[]): Span => streams.length ? [Math.min(...streams.map((s) => s.from_s)), Math.max(...streams.map((s) => s.to_s))] : [0, 0];
 
 const rateOf = (look: Look, s: Stream) => s.rate_hz ?? look.logs.find((log) => log.name === s.file)?.streams.find((one) => one.name === s.name)?.rate_hz ?? null;
+
+/** Stamps from which a clock is one of dates or of the GPS week, s: times are shown from the beginning of the record. */
+const OF_DATES = 1e5;
+
+/** The stamp that is shown as zero: of a clock of dates the first, else its own zero. */
+function zeroOf(look: Look): number {
+  const first = Math.min(...look.streams.map((s) => s.from_s));
+  return Number.isFinite(first) && first >= OF_DATES ? first : 0;
+}
+
+/** When the record begins, and from when times are shown; empty where there is nothing to say. */
+function saidOfZero(look: Look, zero: number): string {
+  const dated = look.logs.flatMap((log) => log.streams).find((s) => s.clock === "unix");
+  const when = dated && new Date(1000 * (dated.from_s + (dated.clock_origin_s ?? 0)));
+  const date = when && !Number.isNaN(when.getTime()) ? `The record begins at ${when.toISOString().slice(0, 19).replace("T", " ")} UTC. ` : "";
+  return date + (zero ? `Times are from its beginning, which is ${stamp(zero, 1)} s in the file.` : "");
+}
 
 const WORDS: Record<string, string> = {
   imu: "inertial sensors", gnss: "satellite fixes", magnetometer: "magnetometer", barometer: "barometer",
@@ -122,33 +140,55 @@ function Found({ look, reading }: { look: Look; reading: Reading }) {
 }
 
 function Contents({ look }: { look: Look }) {
+  const zero = zeroOf(look);
   return <>
     <Table head={["Stream", "File", "Samples", "Rate", "From", "To", "Gaps"]} numeric={[2, 3, 4, 5, 6]}
       rows={look.streams.map((s) => {
         const told = look.logs.find((log) => log.name === s.file)?.streams.find((one) => one.name === s.name);
         return [wordsOf(s), s.file ?? "", s.rows.toLocaleString("en"), rateOf(look, s) ? `${number(rateOf(look, s)!, 4)} Hz` : "–",
-          `${stamp(s.from_s, 1)} s`, `${stamp(s.to_s, 1)} s`, told?.gaps ? `${told.gaps}, ${duration(told.lost_s)} lost` : "none"];
+          `${stamp(s.from_s - zero, 1)} s`, `${stamp(s.to_s - zero, 1)} s`, told?.gaps ? `${told.gaps}, ${duration(told.lost_s)} lost` : "none"];
       })} />
+    {saidOfZero(look, zero) && <p class="soft">{saidOfZero(look, zero)}</p>}
     <dl class="facts">
-      {look.logs.map((log) => <Facts key={log.name} log={log} alone={look.logs.length === 1} />)}
-      {look.streams.some((s) => s.name === "imu") && <><dt>Rests</dt><dd>{look.rests.length ? `${plural(look.rests.length, "stretch", "stretches")}, the longest ${duration(Math.max(...look.rests.map(([a, b]) => b - a)))}` : "none found: it moved all the time"}</dd></>}
+      {look.logs.map((log) => <Facts key={log.name} log={log} zero={zero} alone={look.logs.length === 1} />)}
+      {look.streams.filter((s) => s.name === "imu").map((s) => <><dt>Rests{look.logs.length > 1 ? ` of ${s.file}` : ""}</dt><dd>{restsOf(s)}</dd></>)}
     </dl>
   </>;
 }
 
-function Facts({ log, alone }: { log: LogFound; alone: boolean }) {
+/** Rests of a stream in words; what neither turns nor shakes may move evenly. */
+function restsOf({ rests = [], steady = [] }: Stream): string {
+  const said = (spans: Span[]) => `${plural(spans.length, "stretch", "stretches")}, the longest ${duration(Math.max(...spans.map(([a, b]) => b - a)))}`;
+  const moving = steady.length ? `steady, at rest or moving evenly: ${said(steady)}` : "";
+  return [rests.length ? said(rests) : "none found", moving || (rests.length ? "" : "it moved all the time")].filter(Boolean).join("; ");
+}
+
+function Facts({ log, alone, zero }: { log: LogFound; alone: boolean; zero: number }) {
   const name = alone ? "" : ` of ${log.name}`;
   return <>
     {log.format && <><dt>Format{name}</dt><dd>{log.format.title}</dd></>}
     {log.gravity && <><dt>Gravity{name}</dt><dd>{log.gravity.included ? `included: ${number(log.gravity.median_m_per_s2)} m/s² in the median` : "not included: the log has linear acceleration"}</dd></>}
-    {log.impact && log.impact.delta_v_m_per_s > 1 && <><dt>Largest impact{name}</dt><dd>{number(log.impact.delta_v_m_per_s * 3.6, 3)} km/h within 150 ms, at {stamp(log.impact.at_s, 1)} s</dd></>}
+    {log.impact && log.impact.delta_v_m_per_s > 1 && <><dt>Largest impact{name}</dt><dd>{number(log.impact.delta_v_m_per_s * 3.6, 3)} km/h within 150 ms, at {stamp(log.impact.at_s - zero, 1)} s</dd></>}
   </>;
 }
 
 const QUANTITIES: [RegExp, string][] = [
   [/^gyro_/, "Angular rate"], [/^accel_/, "Specific force"], [/^mag_/, "Magnetic field"], [/^(lat|lon)$/, ""],
-  [/^(alt|height)/, "Height"], [/^(VN|VE|VD)$/, "Velocity"], [/^q_/, "Quaternion"], [/^(roll|pitch|heading)$/, "Attitude"],
+  [/^(alt|height)$/, "Height"], [/^(VN|VE|VD|v[xyz])$/, "Velocity"], [/^q_/, "Quaternion"], [/^(roll|pitch|heading)$/, "Attitude"],
+  [/^(north|east|down)$/, "Position"], [/^(north|east|down|height|alt)_sd$/, "Standard deviation of the position"],
+  [/^(VN|VE|VD|v[xyz])_sd$/, "Standard deviation of the velocity"], [/^(roll|pitch|heading)_sd$/, "Standard deviation of the attitude"],
 ];
+
+/** "speed_sd": "Speed, standard deviation". */
+const inWords = (name: string) => name.replace(/_sd$/, ", standard deviation").replaceAll("_", " ").replace(/^[a-z]/, (c) => c.toUpperCase());
+
+/** Components of a north-east-down velocity. */
+const TOWARDS: Record<string, string> = { VN: "north", VE: "east", VD: "down" };
+
+const labelOf = (name: string) => {
+  const own = name.replace(/^(gyro|accel|mag)_/, "").replace(/_sd$/, "");
+  return TOWARDS[own] ?? own.replaceAll("_", " ");
+};
 
 /** Curves in one panel, at most: as many as there are colors. */
 const TOGETHER = 4;
@@ -157,12 +197,12 @@ const TOGETHER = 4;
 export function panelsOf(stream: Stream): Panel[] {
   const panels = new Map<string, Panel>();
   for (const { name, unit, title: own, label } of stream.columns) {
-    const title = own ?? QUANTITIES.find(([pattern]) => pattern.test(name))?.[1] ?? name;
+    const title = own ?? QUANTITIES.find(([pattern]) => pattern.test(name))?.[1] ?? inWords(name);
     if (title === "") continue;
     let key = `${title}|${unit ?? ""}`, shown = title;
     for (let i = 2; (panels.get(key)?.columns.length ?? 0) >= TOGETHER; i++) { key = `${title}|${unit ?? ""}|${i}`; shown = `${title} (${i})`; }
     const panel = panels.get(key) ?? { title: shown, unit: unit ?? "", columns: [] };
-    panel.columns.push({ name, label: label ?? name.replace(/^(gyro|accel|mag)_/, "") });
+    panel.columns.push({ name, label: label ?? labelOf(name) });
     panels.set(key, panel);
   }
   return [...panels.values()];
@@ -182,6 +222,7 @@ function together(streams: Stream[]): Stream[] {
 }
 
 function Signals({ look, streams, imu, reading }: { look: Look; streams: Stream[]; imu: Stream; reading: Reading }) {
+  const zero = zeroOf(look);
   const { work } = useShared();
   const crash = useMemo(() => together(streams), [streams]);
   const [name, setName] = useState(crash.length ? ALL : keyOf(imu));
@@ -191,7 +232,7 @@ function Signals({ look, streams, imu, reading }: { look: Look; streams: Stream[
   const shown = useMemo(() => name === ALL && crash.length ? crash : [streams.find((s) => keyOf(s) === name) ?? imu], [name, streams]);
   const whole = useMemo<Span>(() => spanOf(shown), [shown]);
   const several = new Set(shown.map((s) => s.file)).size > 1;
-  const all = useMemo(() => shown.flatMap((s) => panelsOf(s).map((p) => ({ ...p, source: keyOf(s), title: several && s.file ? `${p.title} (${s.file})` : p.title }))), [shown]);
+  const all = useMemo(() => shown.flatMap((s) => panelsOf(s).map((p) => ({ ...p, source: keyOf(s), rests: s.rests ?? [], steady: s.steady ?? [], gaps: s.gaps ?? [], title: several && s.file ? `${p.title} (${s.file})` : p.title }))), [shown]);
   const chosen = picked ?? all.slice(0, SHOWN).map((p) => p.title);
   const panels = useMemo(() => all.length > SHOWN ? all.filter((p) => chosen.includes(p.title)) : all, [all, chosen.join("|")]);
   const trim: Span = work.trim ?? [imu.from_s, imu.to_s];
@@ -215,18 +256,18 @@ function Signals({ look, streams, imu, reading }: { look: Look; streams: Stream[
       {all.map((p) => <label class="inline" key={p.title}><input type="checkbox" checked={chosen.includes(p.title)} onChange={(e) => setPicked(e.currentTarget.checked ? [...chosen, p.title] : chosen.filter((t) => t !== p.title))} />{p.title}</label>)}
     </fieldset></More>}
     {shown.some(ofCrash) && <p class="soft">As the files state them: in SI where the unit is known, at the time of each file, not yet turned into the axes of the vehicle.</p>}
-    <Traces panels={panels} whole={whole} askKey={JSON.stringify([reading, name])} cursor={cursor} onCursor={setCursor} ask={ask}
-      trim={trims ? work.trim : null} marks={work.marks} rests={look.rests} gaps={look.gaps} {...(trims ? { onTrim: setTrim } : {})} onMark={(t) => addMark(t)} />
-    <p class="legend"><span><i class="area rest" />at rest</span><span><i class="area gap" />gap</span>{trims && <span><i class="area away" />not used</span>}</p>
-    {trims && <Trim whole={[imu.from_s, imu.to_s]} trim={trim} onTrim={setTrim} look={look} />}
+    <Traces panels={panels} whole={whole} zero={zero} askKey={JSON.stringify([reading, name])} cursor={cursor} onCursor={setCursor} ask={ask}
+      trim={trims ? work.trim : null} marks={work.marks} {...(trims ? { onTrim: setTrim } : {})} onMark={(t) => addMark(t)} />
+    <p class="legend">{shown.some((s) => s.rests?.length) && <span><i class="area rest" />at rest</span>}{shown.some((s) => s.steady?.length) && <span><i class="area steady" />steady: at rest, or moving evenly</span>}<span><i class="area gap" />gap</span>{trims && <span><i class="area away" />not used</span>}</p>
+    {trims && <Trim whole={[imu.from_s, imu.to_s]} trim={trim} onTrim={setTrim} imu={imu} zero={zero} />}
     <h3>Reference points</h3>
     <p class="help">Instants to find again: the impact, a stop, a turn. Put the cursor there first.</p>
     <form class="row" onSubmit={(e) => { e.preventDefault(); if (cursor !== null) addMark(cursor, label.trim()); }}>
       <label class="inline">What it is <input type="text" value={label} onInput={(e) => setLabel(e.currentTarget.value)} placeholder="impact" /></label>
-      <button type="submit" disabled={cursor === null}>{cursor === null ? "Mark the cursor" : `Mark ${stamp(cursor, 10)} s`}</button>
+      <button type="submit" disabled={cursor === null}>{cursor === null ? "Mark the cursor" : `Mark ${stamp(cursor - zero, 10)} s`}</button>
     </form>
     {work.marks.length > 0 && <ul class="list">{work.marks.map((mark) => <li class="item" key={mark.t}>
-      <span class="name">{mark.label}</span><span>{stamp(mark.t, 1)} s</span>
+      <span class="name">{mark.label}</span><span>{stamp(mark.t - zero, 1)} s</span>
       <span class="row"><button type="button" onClick={() => setCursor(mark.t)}>Show</button>
         {trims && <button type="button" disabled={mark.t >= trim[1]} onClick={() => setTrim([mark.t, trim[1]])}>Begin here</button>}
         {trims && <button type="button" disabled={mark.t <= trim[0]} onClick={() => setTrim([trim[0], mark.t])}>End here</button>}
@@ -249,14 +290,16 @@ export function trimmed(which: 0 | 1, text: string, trim: Span, whole: Span): { 
   return { trim: which === 0 ? [kept, other] : [other, kept], said: kept === t ? "" : which === 0 ? `The log begins at ${told(kept)}: the part begins there.` : `The log ends at ${told(kept)}: the part ends there.` };
 }
 
-function Trim({ whole, trim, onTrim, look }: { whole: Span; trim: Span; onTrim: (trim: Span) => void; look: Look }) {
+function Trim({ whole, trim, onTrim, imu, zero }: { whole: Span; trim: Span; onTrim: (trim: Span) => void; imu: Stream; zero: number }) {
   const { work } = useShared();
+  const less = ([from, to]: Span, by: number): Span => [from - by, to - by];
+  const fromZero = { trim: less(trim, zero), whole: less(whole, zero), onTrim: (t: Span) => onTrim(less(t, -zero)) };
   return <>
     <h3>The part to use</h3>
-    <TrimBar whole={whole} trim={trim} onTrim={onTrim} rests={look.rests} gaps={look.gaps} marks={work.marks} />
+    <TrimBar whole={whole} trim={trim} onTrim={onTrim} rests={imu.rests ?? []} gaps={imu.gaps ?? []} marks={work.marks} zero={zero} />
     <div class="row">
-      <TrimInput label="From" which={0} trim={trim} whole={whole} onTrim={onTrim} />
-      <TrimInput label="To" which={1} trim={trim} whole={whole} onTrim={onTrim} />
+      <TrimInput label="From" which={0} {...fromZero} />
+      <TrimInput label="To" which={1} {...fromZero} />
       <span class="soft">{duration(trim[1] - trim[0])} of {duration(whole[1] - whole[0])}</span>
       <button type="button" disabled={!work.trim} onClick={() => setWork({ trim: null })}>Use all</button>
     </div>

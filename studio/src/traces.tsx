@@ -12,6 +12,8 @@ export interface Panel {
   title: string; unit: string; columns: { name: string; label: string }[];
   /** Which stream it is of, where several are shown under one cursor. */
   source?: string;
+  /** Stretches of its sensor, on its clock. */
+  rests?: Span[]; steady?: Span[]; gaps?: Span[];
 }
 
 export type Ask = (columns: string[], view: Span, width: number, signal: AbortSignal, source: string) => Promise<Series>;
@@ -47,14 +49,16 @@ export function axisNumbers(values: number[]): string[] {
 
 interface Props {
   panels: Panel[]; ask: Ask; whole: Span; askKey: string;
+  /** The stamp that is shown as zero, s. */
+  zero?: number;
   cursor: number | null; onCursor: (t: number | null) => void;
-  trim?: Span | null; marks?: { label: string; t: number }[]; rests?: Span[]; gaps?: Span[];
+  trim?: Span | null; marks?: { label: string; t: number }[];
   onMark?: (t: number) => void; onTrim?: (trim: Span) => void;
 }
 
 /** Panels of traces; `askKey` names what is asked for, so that another log is fetched anew. */
 export function Traces(props: Props) {
-  const { panels, ask, whole, askKey, cursor, onCursor, trim } = props;
+  const { panels, ask, whole, askKey, cursor, onCursor, trim, zero = 0 } = props;
   const [view, setView] = useState<Span>(whole);
   const [series, setSeries] = useState<Sources | null>(null);
   const [problem, setProblem] = useState<Problem | null>(null);
@@ -109,8 +113,8 @@ export function Traces(props: Props) {
     if (props.onTrim && cursor !== null) {
       const [from, to] = trim ?? whole;
       const put = (fits: boolean, made: Span, why: string) => { setRefused(fits ? "" : why); if (fits) props.onTrim!(made); };
-      act["["] = () => put(cursor < to, [cursor, to], `The part cannot begin at the cursor: it ends at ${stamp(to, 1)} s. Put its end later first, with ].`);
-      act["]"] = () => put(cursor > from, [from, cursor], `The part cannot end at the cursor: it begins at ${stamp(from, 1)} s. Put its beginning earlier first, with [.`);
+      act["["] = () => put(cursor < to, [cursor, to], `The part cannot begin at the cursor: it ends at ${stamp(to - zero, 1)} s. Put its end later first, with ].`);
+      act["]"] = () => put(cursor > from, [from, cursor], `The part cannot end at the cursor: it begins at ${stamp(from - zero, 1)} s. Put its beginning earlier first, with [.`);
     }
     const chosen = act[event.key];
     if (!chosen) return;
@@ -126,7 +130,7 @@ export function Traces(props: Props) {
       <button type="button" onClick={() => pan(0.5)} disabled={view[1] >= whole[1]} aria-label="Later">→</button>
       <button type="button" onClick={() => setView(whole)} disabled={!zoomed}>Whole log</button>
       {trim && <button type="button" onClick={() => show(trim[0], trim[1])}>Part to use</button>}
-      <span class="soft viewed">{stamp(view[0], view[1] - view[0])} to {stamp(view[1], view[1] - view[0])} s</span>
+      <span class="soft viewed">{stamp(view[0] - zero, view[1] - view[0])} to {stamp(view[1] - zero, view[1] - view[0])} s</span>
     </div>
     {problem && <div class="notice bad" role="alert"><p>{problem.text}</p>{problem.remedy && <p>{problem.remedy}</p>}</div>}
     <div class="panels" tabIndex={0} role="group" onKeyDown={keys}
@@ -137,9 +141,15 @@ export function Traces(props: Props) {
       {!series && !problem && <p class="busy" role="status"><span class="spin" aria-hidden="true" />Reading the traces…</p>}
     </div>
     {props.onTrim && <p class="fault" role="alert">{refused}</p>}
-    <Readout panels={panels} series={series} cursor={cursor} whole={whole} />
+    <Readout panels={panels} series={series} cursor={cursor} whole={whole} zero={zero} />
     <p class="help">Drag to zoom; double-click for all. After a click on the traces the wheel zooms too, and the keys ← → + − 0 work.{props.onTrim && " [ and ] put the beginning and the end of the part to use at the cursor, m sets a mark."}</p>
   </div>;
+}
+
+/** Stamps of the ticks of an axis, at whole steps from the one that is shown as zero. */
+function ticksOf(low: number, high: number, step: number, zero: number): number[] {
+  const first = Math.ceil((low - zero) / step - 1e-9), count = Math.floor((high - zero) / step + 1e-9) - first + 1;
+  return Array.from({ length: Math.max(0, Math.min(count, 1000)) }, (_, i) => zero + (first + i) * step);
 }
 
 function indexAt(t: number[], at: number): number {
@@ -151,10 +161,10 @@ function indexAt(t: number[], at: number): number {
   return low > 0 && at - t[low - 1]! < t[low]! - at ? low - 1 : low;
 }
 
-function Readout({ panels, series, cursor, whole }: { panels: Panel[]; series: Sources | null; cursor: number | null; whole: Span }) {
+function Readout({ panels, series, cursor, whole, zero }: { panels: Panel[]; series: Sources | null; cursor: number | null; whole: Span; zero: number }) {
   if (!series || cursor === null || !Object.values(series).some((one) => one.t.length)) return <p class="readout soft">Point at a trace to read its values.</p>;
   return <p class="readout" aria-live="polite">
-    <b>{stamp(cursor, 1)} s</b> <span class="soft">({stamp(cursor - whole[0], 1)} s from the beginning)</span>
+    <b>{stamp(cursor - zero, 1)} s</b><span class="soft"> {zero ? "from the beginning" : `(${stamp(cursor - whole[0], 1)} s from the beginning)`}</span>
     {panels.map((panel) => <span class="values" key={`${sourceOf(panel)}|${panel.title}`}>
       {panel.columns.map((column, j) => {
         const own = series[sourceOf(panel)];
@@ -206,7 +216,7 @@ function OnePanel(props: Props & {
         } },
       },
       axes: [
-        { ...axis, size: 30, space: 90, values: (_, ticks, __, ___, step) => ticks.map((t) => t.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)))) },
+        { ...axis, size: 30, space: 90, splits: (_, __, low, high, step) => ticksOf(low, high, step, latest.current.zero ?? 0), values: (_, ticks, __, ___, step) => ticks.map((t) => (t - (latest.current.zero ?? 0)).toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)))) },
         { ...axis, size: 58, values: (_, values) => axisNumbers(values) },
       ],
       cursor: {
@@ -243,7 +253,7 @@ function OnePanel(props: Props & {
 
   useEffect(() => { chart.current?.setSize({ width, height: HEIGHT }); }, [width]);
   useEffect(() => { chart.current?.setData(data, true); }, [data]);
-  useEffect(() => { chart.current?.redraw(false, false); }, [view, props.trim, props.marks, props.rests]);
+  useEffect(() => { chart.current?.redraw(false, false); }, [view, props.trim, props.marks]);
   useEffect(() => {
     const u = chart.current;
     if (!u) return;
@@ -258,7 +268,7 @@ function OnePanel(props: Props & {
   </div>;
 }
 
-function shade(u: uPlot, props: Props) {
+function shade(u: uPlot, props: Props & { panel: Panel }) {
   const { ctx, bbox } = u;
   const area = (from: number, to: number, fill: string) => {
     const left = Math.max(bbox.left, u.valToPos(from, "x", true));
@@ -268,8 +278,9 @@ function shade(u: uPlot, props: Props) {
     ctx.fillRect(left, bbox.top, Math.max(1, right - left), bbox.height);
   };
   ctx.save();
-  for (const [from, to] of props.rests ?? []) area(from, to, color("--rest"));
-  for (const [from, to] of props.gaps ?? []) area(from, to, color("--gap"));
+  for (const [from, to] of props.panel.rests ?? []) area(from, to, color("--rest"));
+  for (const [from, to] of props.panel.steady ?? []) area(from, to, color("--steady"));
+  for (const [from, to] of props.panel.gaps ?? []) area(from, to, color("--gap"));
   if (props.trim) {
     area(props.whole[0], props.trim[0], color("--away"));
     area(props.trim[1], props.whole[1], color("--away"));
@@ -296,8 +307,8 @@ function mark(u: uPlot, props: Props) {
 }
 
 /** The whole log as one bar: rests, gaps, marks, and the part to use between two handles. */
-export function TrimBar({ whole, trim, onTrim, rests, gaps, marks }: {
-  whole: Span; trim: Span; onTrim: (trim: Span) => void; rests: Span[]; gaps: Span[]; marks: { label: string; t: number }[];
+export function TrimBar({ whole, trim, onTrim, rests, gaps, marks, zero = 0 }: {
+  whole: Span; trim: Span; onTrim: (trim: Span) => void; rests: Span[]; gaps: Span[]; marks: { label: string; t: number }[]; zero?: number;
 }) {
   const bar = useRef<HTMLDivElement>(null);
   const length = whole[1] - whole[0] || 1;
@@ -324,7 +335,7 @@ export function TrimBar({ whole, trim, onTrim, rests, gaps, marks }: {
     put(which, trim[which] + change);
   };
   const handle = (which: 0 | 1, name: string) => <div class="handle" style={{ left: share(trim[which]) }} role="slider" tabIndex={0}
-    aria-label={name} aria-valuemin={whole[0]} aria-valuemax={whole[1]} aria-valuenow={trim[which]} aria-valuetext={`${stamp(trim[which], length)} s`}
+    aria-label={name} aria-valuemin={whole[0]} aria-valuemax={whole[1]} aria-valuenow={trim[which]} aria-valuetext={`${stamp(trim[which] - zero, length)} s`}
     onPointerDown={drag(which)} onKeyDown={keys(which)} />;
   return <div class="trimbar" ref={bar}>
     {rests.map(([from, to]) => <span class="rest" key={from} style={{ left: share(from), width: `${(100 * (to - from)) / length}%` }} />)}

@@ -5,6 +5,8 @@ export interface StoredFile { name: string; bytes: number; modified: number | st
 export interface Run {
   name: string; command: string; title: string; made: number | string; digest: string;
   verdict: string | null;
+  /** Whether it holds a simulated crash with its case, which can be run. */
+  case?: boolean;
 }
 
 export type JobState = "waiting" | "running" | "done" | "failed" | "cancelled" | "lost";
@@ -48,6 +50,8 @@ export interface Column {
 export interface Stream {
   file?: string; name: string; rows: number; rate_hz?: number | null; from_s: number; to_s: number;
   columns: Column[];
+  /** Of the samples of its file, on its clock; steady: at rest, or moving evenly. */
+  rests?: Span[]; steady?: Span[]; gaps?: Span[];
 }
 
 export type Span = [number, number];
@@ -56,7 +60,7 @@ export interface Fit { answer: string; reasons: Finding[] }
 
 export interface LogFound {
   name: string; format: { name: string; title: string } | null;
-  streams: { name: string; rows: number; rate_hz: number | null; from_s: number; to_s: number; gaps: number; lost_s: number; columns: string[]; clock?: string }[];
+  streams: { name: string; rows: number; rate_hz: number | null; from_s: number; to_s: number; gaps: number; lost_s: number; columns: string[]; clock?: string; clock_origin_s?: number }[];
   read_as: { source: string; quantity: string; unit: string | null; why: string }[];
   stationary: { from_s: number; to_s: number; grade: string }[];
   gravity: { included: boolean; median_m_per_s2: number; at_rest_m_per_s2: number | null } | null;

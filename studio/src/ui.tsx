@@ -114,25 +114,29 @@ export function Ask({ question, onAnswer, list, take }: { question: Question; on
   const [text, setText] = useState("");
   const [fault, setFault] = useState("");
   const id = useId();
+  const count = question.count ?? 3;
+  // A position is along the axes of the vehicle; of other lists the question says what they are.
+  const named = count === 3 && /(^|\.)(position|lever_arm|contact)_m$/.test(question.key ?? "") ? "Forward, right, down: three" : `${count}`;
+  const example = `${named} numbers with commas between them, such as ${[0.3, 0, -1.2, 0, 0, 0].slice(0, count).join(", ")}`;
   const submit = (event: Event) => {
     event.preventDefault();
     if (!question.key || text.trim() === "") return setFault("Write an answer first.");
     const value = question.free === "text" ? text : parseNumbers(text);
-    const count = question.count ?? 3;
-    if (list && question.free !== "text" && (!Array.isArray(value) || value.length !== count)) return setFault(`${count} numbers with commas between them, such as ${[0.3, 0, -1.2, 0, 0, 0].slice(0, count).join(", ")}.`);
+    if (list && question.free !== "text" && (!Array.isArray(value) || value.length !== count)) return setFault(`${example}.`);
     if (value === null || (Array.isArray(value) && !list)) return setFault("This has to be a number, such as 0.25.");
     setFault("");
     onAnswer({ [question.key]: value });
   };
   return <div class="ask" role="group" aria-labelledby={id} ref={own} tabIndex={-1}>
-    <p id={id}>{sentence(question.text)}{question.line ? <span class="soft"> (line {question.line})</span> : null}</p>
+    <p id={id}>{sentence(question.text)}</p>
     {question.remedy && <p class="help">{sentence(question.remedy)}</p>}
     {question.choices.length > 0 && <div class="row">
       {question.choices.map((choice: Choice) => <button type="button" key={choice.label} onClick={() => onAnswer(choice.set)}>{choice.label}{choice.likely ? " (likely)" : ""}</button>)}
     </div>}
+    {question.free && list && question.free !== "text" && <p class="help" id={`${id}e`}>{example}.</p>}
     {question.free && <form class="row" onSubmit={submit}>
       <span class="withunit">
-        <input type="text" aria-label="Your answer" inputMode={question.free === "number" && !list ? "decimal" : "text"} value={text} aria-invalid={fault !== ""} aria-describedby={fault ? `${id}f` : undefined} onInput={(e) => setText(e.currentTarget.value)} />
+        <input type="text" aria-label="Your answer" inputMode={question.free === "number" && !list ? "decimal" : "text"} value={text} aria-invalid={fault !== ""} aria-describedby={fault ? `${id}f` : list ? `${id}e` : undefined} onInput={(e) => setText(e.currentTarget.value)} />
         {question.unit && <span class="unit">{question.unit}</span>}
       </span>
       <button type="submit">Answer</button>

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shlex
 import shutil
 import tomllib
@@ -539,3 +541,64 @@ def test_every_help_is_that_of_a_field():
     assert set(helps["path"]) <= known
     endings = {".".join(path.split(".")[-n:]) for path in known for n in (1, 2)}
     assert set(helps["name"]) <= endings
+
+
+def test_stretches_are_of_the_samples_of_their_own_file(folder):
+    rows = np.loadtxt(folder / "log.csv", delimiter=",", skiprows=1)
+    head = (folder / "log.csv").read_text().partition("\n")[0]
+
+    def written(name, shift, push):
+        other = rows.copy()
+        other[:, 0] += shift
+        other[:, 4] += push
+        np.savetxt(folder / name, other, "%.9g", ",", header=head, comments="")
+
+    written("late.csv", 5.0, 0.0)
+    written("pushed.csv", 0.0, 4.0)
+    found = look(folder, ["log.csv", "late.csv", "pushed.csv"], {}, "forward-right-down")
+    spans = {s["file"]: (s["rests"], s["steady"]) for s in found["streams"]}
+    (rest,) = spans["log.csv"][0]
+    assert rest == pytest.approx([0.0, 20.0], abs=1.0) and not spans["log.csv"][1]
+    assert spans["late.csv"][0] == [pytest.approx([rest[0] + 5.0, rest[1] + 5.0])]
+    # A steady acceleration of 4 m/s² neither turns nor shakes, and is no rest.
+    assert spans["pushed.csv"] == ([], [pytest.approx(rest)])
+    assert found["rests"] == [rest]
+
+
+def test_what_look_finds_names_no_option_of_the_command_line(folder):
+    found = look(folder, ["log.csv"], {})
+    # The options are for the command that the page shows.
+    del found["logs"][0]["options"]
+    said = json.dumps(found)
+    assert "io.sampling-taken-as-instantaneous" in said
+    assert not re.search(r"(?<![\w-])--[a-z]", said)
+
+
+def test_a_folder_of_two_recorders_is_its_files(folder):
+    """Ticked as a folder it gives what its files give that are ticked one by one."""
+    rows = np.loadtxt(folder / "log.csv", delimiter=",", skiprows=1)
+    head = (folder / "log.csv").read_text().partition("\n")[0]
+    rows[:, 4] -= 100.0 * ((rows[:, 0] > 30.0) & (rows[:, 0] < 30.1))
+    (folder / "two").mkdir()
+    for k, name in enumerate(("one.csv", "other.csv")):
+        rows[:, 0] += 5.0 * k
+        np.savetxt(folder / "two" / name, rows, "%.9g", ",", header=head, comments="")
+    (folder / "two" / "notes.txt").write_text("It rained.\n")
+    files = ["two/one.csv", "two/other.csv"]
+    by_folder, by_files = (look(folder, names, {}) for names in (["two"], files))
+    assert [s["file"] for s in by_folder["streams"]] == files
+    assert by_folder["streams"] == by_files["streams"]
+    made, one_by_one = (propose(folder, "crash", n, {}, None, {}) for n in (["two"], files))
+    assert made["toml"] == one_by_one["toml"] and made["toml"].count("[[units]]") == 2
+    unused = [f["file"] for f in made["findings"] if f["code"] == "studio.file-not-used"]
+    assert unused == ["two/notes.txt"]
+
+
+def test_what_is_steady_before_an_impact_may_be_a_drive(folder):
+    rows = np.loadtxt(folder / "log.csv", delimiter=",", skiprows=1)
+    head = (folder / "log.csv").read_text().partition("\n")[0]
+    rows[:, 4] -= 100.0 * ((rows[:, 0] > 30.0) & (rows[:, 0] < 30.1))
+    np.savetxt(folder / "hit.csv", rows, "%.9g", ",", header=head, comments="")
+    found = look(folder, ["hit.csv"], {}, "forward-right-down")
+    (samples,) = found["streams"]
+    assert samples["rests"] == [] and samples["steady"] == found["rests"] != []

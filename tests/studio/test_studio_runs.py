@@ -344,3 +344,24 @@ def test_a_finding_that_is_not_known_is_in_the_words_of_its_result():
     # Data of another form.
     wrong = {"code": "io.time-counter-wraps", "data": 3, "sentence": "as it was", "remedy": None}
     assert runs._finding(wrong)["text"] == "as it was"
+
+
+def test_the_case_of_a_simulated_crash_can_be_run(studio):
+    """As the page does it: its text, with the paths from the folder of the studio."""
+    by_command_line(studio.folder, "strapdown simulate pole --out hit --quiet")
+    (listed,) = [r for r in studio.ask("GET", "api/state").json["runs"] if r["name"] == "hit"]
+    assert listed["command"] == "simulate" and listed["case"]
+    text = (studio.folder / "hit" / "case.toml").read_text()
+    shown = studio.ask("GET", "runs/hit/case.toml")
+    assert shown.status == 200 and shown.body.decode() == text
+    values = studio.ask("POST", "api/check", {"kind": "crash", "toml": text}).json["values"]
+    paths = {key: f"hit/{value}" for key, value in values.items() if key.endswith(".path")}
+    assert len(paths) > 6
+    asked = {"kind": "crash", "toml": text, "set": paths}
+    made = studio.ask("POST", "api/check", asked).json
+    assert made["errors"] == []
+    asked = {"kind": "crash", "name": "hit-crash", "toml": made["toml"], "options": ["--no-report"]}
+    job = studio.finished(studio.ask("POST", "api/jobs", asked).json)
+    assert job["state"] == "done", job
+    (result,) = [r for r in studio.ask("GET", "api/state").json["runs"] if r["name"] == "hit-crash"]
+    assert result["command"] == "crash" and not result["case"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Iterator
 from typing import Annotated, Literal
@@ -67,6 +68,16 @@ class LogTable(Spec):
         if self.from_s is not None and self.to_s is not None:
             return self.to_s - self.from_s
         return self.duration_s
+
+    def part_s(self, first: float) -> tuple[float, float]:
+        """Return begin and end of the part to use, s, infinite where none is stated.
+
+        `first`: first stamp of the samples, s, from which a length counts.
+        """
+        begin = -math.inf if self.from_s is None else self.from_s
+        if self.duration_s is not None:
+            return begin, (first if self.from_s is None else self.from_s) + self.duration_s
+        return begin, math.inf if self.to_s is None else self.to_s
 
 
 class FixesTable(Spec):

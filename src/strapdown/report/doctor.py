@@ -15,7 +15,7 @@ from strapdown import __version__
 from strapdown.bundle import write_json
 from strapdown.config.logs import DoctorSpec
 from strapdown.constants import MICRO_G
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, Words
 from strapdown.formats.clocks import UNIX, on_clock_of
 from strapdown.formats.recording import AXES_OF_SENSOR, PLACEHOLDERS
 from strapdown.report.chart import (
@@ -72,8 +72,8 @@ def _write_data(result: Diagnosis, folder: Path) -> None:
     write_json(folder / "doctor.json", diagnosis_json(result))
 
 
-def diagnosis_json(result: Diagnosis) -> dict[str, Any]:
-    """Return a diagnosis as plain data for programs.
+def diagnosis_json(result: Diagnosis, words: Words = "cli") -> dict[str, Any]:
+    """Return a diagnosis as plain data for programs, its sentences in these words.
 
     Returns
     -------
@@ -85,19 +85,20 @@ def diagnosis_json(result: Diagnosis) -> dict[str, Any]:
         {
             **one.data,
             "fit": {
-                use: {"answer": one.answer(use), "reasons": _listed(one.fit[use])} for use in USES
+                use: {"answer": one.answer(use), "reasons": _listed(one.fit[use], words)}
+                for use in USES
             },
-            "questions": _listed(one.questions),
-            "faults": _listed(one.faults),
-            "notes": _listed(one.notes),
+            "questions": _listed(one.questions, words),
+            "faults": _listed(one.faults, words),
+            "notes": _listed(one.notes, words),
         }
         for one in result.logs
     ]
-    return finite({"logs": logs, "between": _listed(result.between)})
+    return finite({"logs": logs, "between": _listed(result.between, words)})
 
 
-def _listed(findings: Iterable[Finding]) -> list[Any]:
-    return [one.plain("cli") for one in findings]
+def _listed(findings: Iterable[Finding], words: Words) -> list[Any]:
+    return [one.plain(words) for one in findings]
 
 
 # The answer, which page and terminal share.

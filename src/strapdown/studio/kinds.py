@@ -141,9 +141,9 @@ def _compared(kind: str, path: Path, columns: set[str], *, within: bool) -> bool
 
 def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
     """Return what each file is for, by what `look` found in it; a person may have said it."""
-    from strapdown.studio.look import look
+    from strapdown.studio.look import files_of_recorders, look
 
-    own = {path.as_posix(): path for path in paths}
+    own = {path.as_posix(): path for path in files_of_recorders(paths)}
     found = look(Path.cwd(), list(own), keys, axes)
     held: dict[str, dict[str, set[str]]] = {name: {} for name in own}
     for one in found["streams"]:
@@ -261,22 +261,40 @@ def _drafted(made: Any, roles: Roles) -> Draft:
 def _draft_crash(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
     from strapdown.crash.template import draft_cases
     from strapdown.formats.crash_records import read_crash_record
+    from strapdown.studio.look import files_of_recorders
 
     records, seen = [], set()
-    for path in paths:
+    for path in files_of_recorders(paths):
         # A record of several files is one, whichever of them are chosen.
         if path.resolve() not in seen:
             records.append(read_crash_record(path))
             seen |= {file.resolve() for file in (*records[-1].files, path)}
+    unused = [
+        Finding("studio.file-not-used", severity="note", file=file.as_posix())
+        for path in paths
+        for file in _inside(path)
+        if file.resolve() not in seen
+    ][:MOST_UNUSED]
     begin, end = keys.get("from_s"), keys.get("to_s")
     part: tuple[Finding, ...] = ()
     if begin is not None or end is not None:
         data = {"begin": begin or 0.0, "end": math.inf if end is None else end}
         part = (Finding("studio.part-not-used", data=data),)
+    more = (*unused, *part)
     return [
-        Draft(one.text, one.found, one.asked, one.to_check, (*one.findings, *part), one.vehicle)
+        Draft(one.text, one.found, one.asked, one.to_check, (*one.findings, *more), one.vehicle)
         for one in draft_cases(records, folder=Path())
     ]
+
+
+def _inside(path: Path) -> list[Path]:
+    """List the files of a folder by name, without hidden ones; none of a file."""
+    found = path.iterdir() if path.is_dir() else ()
+    return sorted(file for file in found if file.is_file() and not file.name.startswith("."))
+
+
+#: Files of a folder that are listed as not used, at most.
+MOST_UNUSED = 20
 
 
 def _by_file(command: str) -> Callable[[Any, str], tuple[list[str], str]]:
@@ -398,6 +416,9 @@ def _draft_of_options(table: str, what: str, example: Iterable[tuple[str, str, s
     """Return the draft of a kind with options: the log as it was read, and keys with defaults."""
 
     def draft(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
+        from strapdown.studio.look import files_of_recorders
+
+        paths = files_of_recorders(paths)
         roles = _roles(table, paths, keys, axes)
         if table == "attitude" and roles.asked:
             return [Draft("", choose=roles.asked)]

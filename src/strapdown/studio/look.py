@@ -8,19 +8,21 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.bundle import sha256, source_digest
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.studio.folder import Folder, plain_name
 from strapdown.studio.pyramid import LIST, write_stream
@@ -36,16 +38,25 @@ from strapdown.studio.reading_process import told
 from strapdown.tables import find_gaps
 from strapdown.tables.checks import index_of
 
+if TYPE_CHECKING:
+    from strapdown.systems.doctor import LogDiagnosis
+
 __all__ = ["CACHE", "kept_stream", "look", "stream"]
 
 #: Most bytes of the cache; beyond, what was used last longest ago is removed.
 CACHE = 4 << 30
 #: Names of the parts of the result: gaps and rests that are listed at most.
 MOST = 500
+#: By how much the mean force of a rest may differ from gravity, m/s²: bias and scale of a low-cost
+#: accelerometer.
+OF_GRAVITY = 0.5
 #: Endings of headers of crash tests, whose samples are in files of their own.
 HEADERS = (".ev5", ".mme")
 #: Lists of what `look` finds.
-PARTS = (*("logs", "between", "said", "uses", "findings", "questions", "streams", "rests", "gaps"),)
+PARTS = (
+    *("logs", "between", "said", "uses", "findings", "questions", "streams"),
+    *("rests", "gaps"),
+)
 #: Units of columns of the tables, by the name, or its beginning before ``_``.
 UNITS = {
     **dict.fromkeys(("gyro_x", "gyro_y", "gyro_z"), "rad/s"),
@@ -77,13 +88,15 @@ def look(
     Returns
     -------
     dict
-        The JSON of `doctor`; ``questions``, ``streams``, ``rests`` and ``gaps``.
+        The JSON of `doctor`; ``questions``; ``streams``, each with the ``rests``, ``steady``
+        stretches and ``gaps`` of the samples of its file; ``rests``, steady ones too, and ``gaps``
+        of the first log.
     """
     from strapdown.api.doctor import doctor
     from strapdown.report.doctor import diagnosis_json, headline, uses
 
     place = Folder(folder)
-    paths = [place.file(name) for name in names]
+    paths = files_of_recorders([place.file(name) for name in names])
     if not paths:
         raise ConfigError("studio.nothing-named")
     keys = _reading(log)
@@ -106,7 +119,8 @@ def look(
             raise
         return {**{part: [] for part in PARTS}, "questions": asked}
     streams: list[dict[str, Any]] = []
-    for one in made.logs:
+    own_stretches = [_stretches(one) for one in made.logs]
+    for one, stretches in zip(made.logs, own_stretches, strict=True):
         path = by_name[Path(one.log.path).as_posix()]
         own = _key([path], keys, axes)
         lent = one.data["fixes_from"]
@@ -119,21 +133,16 @@ def look(
                 "key": own,
                 "name": name,
                 "rate_hz": rates.get(name),
+                **stretches,
             }
             streams.append({**about, **listed})
         if one.data["crash_record"]:
             for name, about, listed in _channels(_cache(place) / own, path):
-                streams.append(
-                    {"file": place.name_of(path), "key": own, "name": name, **about, **listed}
-                )
-    first = next((one for one in made.logs if "imu" in one.streams), made.logs[0])
-    gaps = []
-    if "imu" in first.streams:
-        time = index_of(first.streams["imu"])
-        if (np.diff(time) > 0.0).all():
-            gaps = [[g.start, g.end] for g in find_gaps(time)[:MOST]]
+                about = {"file": place.name_of(path), "key": own, "name": name, **about}
+                streams.append({**about, **stretches, **listed})
+    first = next((k for k, one in enumerate(made.logs) if "imu" in one.streams), 0)
     found = {
-        **diagnosis_json(made),
+        **diagnosis_json(made, "studio"),
         "said": [headline(one) for one in made.logs],
         "uses": [{use: one.answer(use) for use in uses(one)} for one in made.logs],
         "findings": [told(f) for one in made.logs for f in (*one.faults, *one.notes)],
@@ -142,11 +151,71 @@ def look(
             *_heights_of(made.between, by_name),
         ],
         "streams": streams,
-        "rests": [[rest.start, rest.end] for rest in first.rests[:MOST]],
-        "gaps": gaps,
+        # For what may be found out with them: with those that may be of a drive.
+        "rests": sorted(own_stretches[first]["rests"] + own_stretches[first]["steady"]),
+        "gaps": own_stretches[first]["gaps"],
     }
     _written(kept, found)
     _forget(_cache(place))
+    return found
+
+
+#: Why a folder is no recording: it has those of several sensors.
+SEVERAL = ("io.folder-of-recordings", "io.gyro-in-several-logs")
+
+
+def files_of_recorders(paths: Sequence[Path]) -> list[Path]:
+    """Return paths with the tables of a folder in its place, where they are of several recorders.
+
+    A folder is one recorder, whose tables are joined, unless two of them have a gyro.
+    """
+    return [one for path in paths for one in (_tables(path) if _of_several(path) else [path])]
+
+
+def _of_several(path: Path) -> bool:
+    """Whether it is a folder that is refused for the recordings of several sensors."""
+    from strapdown.formats import open_stream
+    from strapdown.formats.crash_records import stated_format
+
+    if not path.is_dir() or stated_format(path) is not None:
+        return False
+    try:
+        open_stream(path, "imu", None)
+    except StrapdownError as error:
+        return error.finding.code in SEVERAL
+    return False
+
+
+def _tables(folder: Path) -> list[Path]:
+    """List the tables of a folder that can be read as records of a crash, by name."""
+    from strapdown.formats.crash_records import read_crash_record
+
+    found = []
+    for path in sorted(folder.iterdir()):
+        if path.is_file() and not path.name.startswith("."):
+            with suppress(StrapdownError):
+                read_crash_record(path)
+                found.append(path)
+    return found
+
+
+def _stretches(one: LogDiagnosis) -> dict[str, list[list[float]]]:
+    """List rests, steady stretches and gaps of the samples of a log, from and to in s on its clock.
+
+    What neither turns nor shakes is at rest, or moves evenly. It is called a rest where its mean
+    force is gravity, and no impact in the log says that it is of a drive.
+    """
+    found: dict[str, list[list[float]]] = {"rests": [], "steady": [], "gaps": []}
+    if "imu" not in one.streams:
+        return found
+    driven = any(reason.code == "doctor.impact" for reason in one.fit["crash"])
+    for rest in one.rests[:MOST]:
+        force = math.nan if rest.accel_mean is None else math.hypot(*rest.accel_mean)
+        still = abs(force - STANDARD_GRAVITY) < OF_GRAVITY and not driven
+        found["rests" if still else "steady"].append([rest.start, rest.end])
+    time = index_of(one.streams["imu"])
+    if (np.diff(time) > 0.0).all():
+        found["gaps"] = [[g.start, g.end] for g in find_gaps(time)[:MOST]]
     return found
 
 

@@ -63,6 +63,8 @@ ENDINGS = {
     "_m": "m",
     "_s": "s",
 }
+#: Configuration of a crash beside its simulated records.
+CASE = "case.toml"
 #: Downloads that are kept until the next ones.
 KEPT = 4
 EXPORTS = ("zip", "pdf", "gpx", "toml")
@@ -83,6 +85,8 @@ def summary(folder: Path, name: str) -> dict[str, Any]:
         "made": about.st_mtime,
         "digest": sha256(place / MANIFEST),
         "verdict": _verdict(place, manifest),
+        # A simulated crash comes with the case that reconstructs it.
+        "case": manifest["command"] == "simulate" and (place / CASE).is_file(),
     }
 
 

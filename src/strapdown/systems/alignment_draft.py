@@ -236,8 +236,8 @@ def _inline(value: Any) -> str:
 _CHOSEN = {"backtrack": "navigation begins with the first sample of that part"}
 _WANTED = {
     "heading_deg": "heading of the body at the start, clockwise from north (gyros that "
-    "find north at a rest of a minute need none: name their sensor with --sensor)",
-    "sd_deg": "how well it is known",
+    "find north at a rest of a minute need none, if their sensor is named)",
+    "sd_deg": "how well that heading is known, one standard deviation",
 }
 
 

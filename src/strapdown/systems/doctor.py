@@ -268,7 +268,7 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
         rests = _unmoved(rests, streams)
         findings += found
         findings += _reference_against(streams)
-    clock, found = _fixes_against(streams)
+    clock, found = _fixes_against(streams, inertial.log)
     findings += found
     if record is not None:
         findings += record.findings
@@ -335,7 +335,7 @@ def _judged(one: LogDiagnosis) -> LogDiagnosis:
 def _with_fixes(one: LogDiagnosis, other: LogDiagnosis) -> LogDiagnosis:
     """Return a log with the fixes of another file, and what they are against its samples."""
     streams = {**one.streams, "gnss": other.streams["gnss"]}
-    clock, found = _fixes_against(streams)
+    clock, found = _fixes_against(streams, one.log)
     found = [f for f in found if f not in (*other.faults, *other.notes)]
     rests = _unmoved(one.rests, streams)
     more = {
@@ -558,9 +558,12 @@ def _unmoved(
 
 
 def _fixes_against(
-    streams: Mapping[str, pd.DataFrame],
+    streams: Mapping[str, pd.DataFrame], log: LogTable
 ) -> tuple[dict[str, float] | None, list[Finding]]:
-    """Check fixes by themselves and against the samples; return the offset of the clocks, too."""
+    """Check fixes by themselves and against the samples; return the offset of the clocks, too.
+
+    `log`: which part of the samples was asked for.
+    """
     gnss, imu = streams.get("gnss"), streams.get("imu")
     if gnss is None:
         return None, []
@@ -570,7 +573,7 @@ def _fixes_against(
             return None, list(gnss_readiness(gnss))
         fixes, shifted = on_clock_of(gnss, imu)
         found += [shifted] if shifted else []
-        found += gnss_readiness(fixes, imu)
+        found += gnss_readiness(fixes, imu, part=log.part_s(index_of(imu)[0]))
         offset = time_offset(fixes, imu)
     except DataError as error:
         return None, [*found, error.finding]
@@ -600,7 +603,8 @@ def _between(logs: Sequence[LogDiagnosis]) -> list[Finding]:
             lent = other.name == base.data["fixes_from"] or other.data["fixes_from"] is not None
             if other is base or lent or "gnss" not in other.streams:
                 continue
-            _, said = _fixes_against({**other.streams, "imu": base.streams["imu"]})
+            with_base = {**other.streams, "imu": base.streams["imu"]}
+            _, said = _fixes_against(with_base, base.log)
             own = set(other.faults) | set(other.notes)
             found += [f for f in said if f not in own]
     if len(bases) > 1:

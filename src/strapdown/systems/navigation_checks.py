@@ -15,6 +15,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.estimation.error_model import ERROR_MODELS
 from strapdown.frames import ecef_from_geodetic, place_difference
 from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.gnss_clock import WHOLE
 from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.sensors.health_log import LEAST_SAMPLES, ChannelFault
@@ -61,7 +62,8 @@ def look_through(
         if table is None:
             continue
         if isinstance(aid, Gnss):
-            found += gnss_readiness(table, imu, aid)
+            part = WHOLE if spec.log is None else spec.log.part_s(index_of(imu)[0])
+            found += gnss_readiness(table, imu, aid, part)
             _refuse_far(spec, table, imu, aid)
         elif isinstance(aid, TabulatedMeasurement):
             _refuse_apart(table, imu)

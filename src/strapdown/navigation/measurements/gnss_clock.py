@@ -57,6 +57,8 @@ ROUNDED = 1e-14
 #: Of more steps the first are used: two hours of fixes each second know an offset to milliseconds.
 MOST_STEPS = 7200
 LONGEST_STEP = 1.5
+#: A part that is the whole record, s.
+WHOLE = (-math.inf, math.inf)
 #: An offset is reported from so many standard deviations, and at least this, s.
 SURE, LEAST_OFFSET = 3.0, 0.02
 
@@ -80,13 +82,20 @@ class TimeOffset:
     by: str
 
 
-def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) -> list[Finding]:
+def check_overlap(
+    gnss: pd.DataFrame,
+    imu: pd.DataFrame,
+    offset: float = 0.0,
+    part: tuple[float, float] = WHOLE,
+) -> list[Finding]:
     """Refuse fixes that do not overlap the inertial record in time.
 
     Parameters
     ----------
     offset : float, s
         Time stamps of the receiver minus the time of the sensors, as configured.
+    part : (2,), s
+        Of the record that was asked for: fixes beyond it are not counted.
 
     Returns
     -------
@@ -120,15 +129,16 @@ def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) ->
     ):
         if late > slack:
             found.append(Finding(code, file=source, row=row + 1, quantity="time", apart=late))
-    outside = len(time) - len(inside)
-    if outside > 0.2 * len(time):
+    asked = (time >= part[0]) & (time <= part[1])
+    count, outside = int(asked.sum()), int((asked & ~within).sum())
+    if outside > 0.2 * count:
         found.append(
             Finding(
                 "navigation.fixes-outside-inertial-record",
                 file=source,
                 quantity="time",
                 outside=outside,
-                count=len(time),
+                count=count,
             )
         )
     return found

@@ -15,6 +15,7 @@ from strapdown.frames import ned_from_geodetic, place_difference, ways_between
 from strapdown.navigation.measurements.clock_windows import stamp_step, step_finding
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.gnss_clock import (
+    WHOLE,
     check_overlap,
     find_time_offset,
     find_velocity_delay,
@@ -43,7 +44,10 @@ __all__ = [
 
 
 def gnss_readiness(
-    table: pd.DataFrame, imu: pd.DataFrame | None = None, aid: Gnss | None = None
+    table: pd.DataFrame,
+    imu: pd.DataFrame | None = None,
+    aid: Gnss | None = None,
+    part: tuple[float, float] = WHOLE,
 ) -> tuple[Finding, ...]:
     """Check fixes by themselves, and against the inertial record.
 
@@ -55,6 +59,8 @@ def gnss_readiness(
         Imu table.
     aid : Gnss, optional
         As it is configured: options already set are not reported again.
+    part : (2,), s
+        Of the record that was asked for, on the clock of `imu`.
 
     Returns
     -------
@@ -73,7 +79,7 @@ def gnss_readiness(
         found += find_velocity_delay(table, aid.velocity_delay)
     if imu is None:
         return tuple(found)
-    found += check_overlap(table, imu, aid.time_offset)
+    found += check_overlap(table, imu, aid.time_offset, part)
     step = stamp_step(table)
     if step is not None and step.certain:
         found.append(step_finding(table, imu, step))

@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[3]))
 from tests.gnss_faults import Frozen, Outage, Outliers, inject_gnss_faults
 
 import town_drive as town
+from strapdown.config.logs import LogTable
 from strapdown.errors import DataError
 from strapdown.frames import geodetic_from_ned
 from strapdown.navigation.measurements import gnss_clock
@@ -195,6 +196,25 @@ def test_an_outage_at_the_start_is_told_with_its_row():
     (told,) = check_overlap(table, imu())
     assert "after its start" in told.what
     assert told.row == 1
+
+
+def test_fixes_beyond_the_part_that_was_asked_for_are_not_counted():
+    table, record = remade(town.fixes()), imu()
+    first, last = record.index[0], table.index[-1]
+    asked = first + 0.4 * (last - first)
+    cut = record[record.index <= asked]
+    cut.attrs = dict(record.attrs)
+    code = "navigation.fixes-outside-inertial-record"
+    told = {one.code: one for one in check_overlap(table, cut)}
+    assert told[code].data["count"] == len(table)
+    part = LogTable(path="log.csv", to_s=asked).part_s(first)
+    assert code not in {one.code for one in check_overlap(table, cut, 0.0, part)}
+    # What was asked for, and is not in the record, counts.
+    later = LogTable(path="log.csv", from_s=first, duration_s=2.0 * (asked - first)).part_s(first)
+    told = {one.code: one for one in check_overlap(table, cut, 0.0, later)}
+    within = table.index <= first + 2.0 * (asked - first)
+    assert told[code].data["count"] == within.sum()
+    assert told[code].data["outside"] == (within & (table.index > cut.index[-1])).sum()
 
 
 def test_gaps_jumps_and_repeats_are_told_with_their_rows():
