@@ -70,14 +70,20 @@ class LogTable(Spec):
         return self.duration_s
 
     def part_s(self, first: float) -> tuple[float, float]:
-        """Return begin and end of the part to use, s, infinite where none is stated.
+        """Return begin and end of the part to use, as `ends_of_part`."""
+        return ends_of_part(first, self.from_s, self.to_s, self.duration_s)
 
-        `first`: first stamp of the samples, s, from which a length counts.
-        """
-        begin = -math.inf if self.from_s is None else self.from_s
-        if self.duration_s is not None:
-            return begin, (first if self.from_s is None else self.from_s) + self.duration_s
-        return begin, math.inf if self.to_s is None else self.to_s
+
+def ends_of_part(
+    first: float, from_s: float | None, to_s: float | None, duration_s: float | None
+) -> tuple[float, float]:
+    """Return begin and end of a part of a record, s, infinite where none is stated.
+
+    `first`: first stamp of the record, s, from which a length counts that has no begin.
+    """
+    if duration_s is not None:
+        to_s = (first if from_s is None else from_s) + duration_s
+    return -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
 
 
 class FixesTable(Spec):

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.bundle import InputFiles, Seal, check_destination, input_files, with_paths
+from strapdown.config.logs import ends_of_part
 from strapdown.config.reading import FileSpec
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.recording import ReadOptions
@@ -104,10 +105,7 @@ def part_of_log(
     if from_s is None and to_s is None and duration_s is None and len(imu) >= 2:
         return imu
     time = imu.index.to_numpy(dtype=np.float64)
-    first = float(time[0]) if from_s is None else from_s
-    last = float(time[-1]) if to_s is None else to_s
-    if duration_s is not None:
-        last = first + duration_s
+    first, last = ends_of_part(float(time[0]), from_s, to_s, duration_s)
     # A stamp that is a sum of steps may miss the instant by rounding.
     slack = 1e-6 * float(np.median(np.diff(time)))
     kept = (time >= first - slack) & (time <= last + slack)
@@ -122,8 +120,8 @@ def part_of_log(
             file=name,
             quantity="time",
             kept=int(kept.sum()),
-            from_s=first,
-            to_s=last,
+            from_s=float(time[0]) if from_s is None else first,
+            to_s=last if ends else float(time[-1]),
             time=time[0],
             time_2=time[-1],
         )

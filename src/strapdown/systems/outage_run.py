@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from strapdown.bundle import InputFiles, Seal, sensor_file
 from strapdown.config.alignment import sensors_of
+from strapdown.config.logs import ends_of_part
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.outage import OutageSpec, OutageStartTable
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
@@ -453,9 +454,9 @@ def _spans(
                 end_2=end - spec.outage_s,
             )
         return (Span("outage", spec.at_s, spec.at_s + spec.outage_s),)
-    log = float(index_of(source.imu)[0]) if spec.from_s is None else spec.from_s
-    to = spec.to_s if spec.duration_s is None else log + spec.duration_s
-    within = (max(first, log), end if to is None else min(end, to))
+    begin = float(index_of(source.imu)[0])
+    log, to = ends_of_part(begin, spec.from_s, spec.to_s, spec.duration_s)
+    within = (max(first, log), min(end, to))
     if within != (first, end) and within[1] - within[0] < spec.outage_s <= end - first:
         raise ConfigError(
             "outage.outage-longer-than-between",
