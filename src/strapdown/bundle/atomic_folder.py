@@ -122,7 +122,7 @@ def claimed(out: Path, force: bool = False) -> Iterator[Path]:
         yield out
     finally:
         if lock is not None:
-            _unlock(out, lock)
+            remove_lock(_lock_file(out), lock)
         _HELD.pop(out, None)
         # A folder that another process has begun to use is kept.
         with suppress(OSError):
@@ -209,12 +209,13 @@ def open_locked(path: Path, *, within: bool = False) -> int:
     return lock
 
 
-def _unlock(out: Path, lock: int) -> None:
-    """Release a name. Unlike POSIX, Windows cannot remove a file that is open."""
+def remove_lock(path: Path, lock: int) -> None:
+    """Remove a lock file that is held, and release it."""
+    # Unlike POSIX, Windows cannot remove a file that is open.
     if WINDOWS:
         os.close(lock)
     with suppress(OSError):
-        _lock_file(out).unlink()
+        path.unlink()
     if not WINDOWS:
         os.close(lock)
 
@@ -239,7 +240,7 @@ def _collect_all(out: Path) -> None:
                 try:
                     _collect(other)
                 finally:
-                    _unlock(other, lock)
+                    remove_lock(_lock_file(other), lock)
 
 
 def _collect(out: Path) -> None:

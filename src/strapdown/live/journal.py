@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.bundle import sha256, to_json
-from strapdown.bundle.atomic_folder import WINDOWS, HeldError, flush_entry, open_locked
+from strapdown.bundle.atomic_folder import HeldError, flush_entry, open_locked, remove_lock
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.live_journal import (
     FRAME,
@@ -352,15 +352,10 @@ def _refuse_none(folder: Path) -> None:
 
 
 def _remove_lock(folder: Path, lock: int) -> None:
-    """Remove a lock that is held, and its folder if nothing else is in it, and release it."""
-    # Unlike POSIX, Windows cannot remove a file that is open.
-    if WINDOWS:
-        os.close(lock)
+    """Remove a lock that is held, and its folder if nothing else is in it."""
+    remove_lock(folder / LOCK, lock)
     with suppress(OSError):
-        (folder / LOCK).unlink()
         folder.rmdir()
-    if not WINDOWS:
-        os.close(lock)
 
 
 def _sync_folder(folder: Path) -> None:
