@@ -773,23 +773,11 @@ def motion_by_fixes(
         time with the least error. The acceleration since is unknown, 1 m/s². None where the fixes
         since `begin` are those of a receiver at rest.
     """
-    if fixes is None or begin >= time:
+    found = _velocity_by_fixes(fixes, begin, time, clear)
+    if found is None:
         return None
-    part = fixes[fixes.index >= begin]
-    told = _velocity_by_fixes(part, time)
-    if told is None:
-        return None
-    v, v_sd = values_of(part, VELOCITY_COLUMNS), values_of(part, VELOCITY_SD)
-    by_velocity = usable(part, VELOCITY_SD[:2])
-    if by_velocity.any():
-        rows = np.flatnonzero(by_velocity)[-NEWEST:]
-        speed = float(np.median(np.hypot(v[rows, 0], v[rows, 1])))
-        return told if speed > max(MOVES, clear * float(v_sd[rows[-1], :2].max())) else None
-    far, span, blur = _apart(part)
-    far_enough = np.hypot(far[:, 0], far[:, 1]) > np.maximum(
-        clear * blur[:, :2].max(axis=1), MOVES * span
-    )
-    return told if far_enough.any() else None
+    velocity, sd, moves = found
+    return (velocity, sd) if moves else None
 
 
 def rest_by_fixes(fixes: pd.DataFrame | None, begin: float, time: float) -> Array:
@@ -798,43 +786,45 @@ def rest_by_fixes(fixes: pd.DataFrame | None, begin: float, time: float) -> Arra
     Standard deviation of its velocity at `time`, north, east, down, where the sensors do not show a
     rest; at most that of a velocity of which nothing is known, and vertically of a moving body.
     """
-    told = None
-    if fixes is not None and begin < time:
-        told = _velocity_by_fixes(fixes[fixes.index >= begin], time)
     unknown = np.array([UNKNOWN_VELOCITY, UNKNOWN_VELOCITY, CLIMB])
-    return unknown if told is None else np.minimum(told[1], unknown)
+    found = _velocity_by_fixes(fixes, begin, time, CLEAR)
+    return unknown if found is None else np.minimum(found[1], unknown)
 
 
-def _velocity_by_fixes(part: pd.DataFrame, time: float) -> tuple[Array, Array] | None:
-    """Velocity and its standard deviation, (3,), m/s; None of fewer than two positions alone."""
+def _velocity_by_fixes(
+    fixes: pd.DataFrame | None, begin: float, time: float, clear: float
+) -> tuple[Array, Array, bool] | None:
+    """Velocity and its standard deviation, as `motion_by_fixes`; and whether they prove a motion.
+
+    None of fewer than two positions alone.
+    """
+    if fixes is None or begin >= time:
+        return None
+    part = fixes[fixes.index >= begin]
+    v, v_sd = values_of(part, VELOCITY_COLUMNS), values_of(part, VELOCITY_SD)
     told = usable(part, VELOCITY_SD[:2])
     if told.any():
-        k = int(np.flatnonzero(told)[-1])
-        v, v_sd = values_of(part, VELOCITY_COLUMNS)[k], values_of(part, VELOCITY_SD)[k]
-        since, measured = time - float(index_of(part)[k]), np.isfinite(v_sd)
-        own = np.where(measured, v_sd, CLIMB)
-        return np.where(measured, v, 0.0), np.hypot(own, MANOEUVRE * since)
-    good = usable(part, POSITION_SD)
+        rows = np.flatnonzero(told)[-NEWEST:]
+        k = int(rows[-1])
+        speed = float(np.median(np.hypot(v[rows, 0], v[rows, 1])))
+        since = time - float(index_of(part)[k])
+        measured = np.isfinite(v_sd[k])
+        own = np.where(measured, v_sd[k], CLIMB)
+        moves = speed > max(MOVES, clear * float(v_sd[k, :2].max()))
+        return np.where(measured, v[k], 0.0), np.hypot(own, MANOEUVRE * since), moves
+    sd, good = values_of(part, POSITION_SD), usable(part, POSITION_SD)
     if good.sum() < 2:
         return None
-    way, span, blur = _apart(part)
-    since = time - float(index_of(part)[good][-1])
-    # Half of the span before the newest fix, the velocity is that of the difference.
-    whole = np.hypot(blur / span[:, None], MANOEUVRE * (0.5 * span + since)[:, None])
-    k = int(np.argmin(whole[:-1, :2].max(axis=1)))
-    return -way[k] / span[k], whole[k]
-
-
-def _apart(part: pd.DataFrame) -> tuple[Array, Array, Array]:
-    """Positions of fixes from the newest, m; times before it, s; sd of the differences, m."""
-    good = usable(part, POSITION_SD)
-    place, sd, stamps = (
-        values_of(part, GEODETIC)[good],
-        values_of(part, POSITION_SD)[good],
-        index_of(part)[good],
-    )
+    place, sd, stamps = values_of(part, GEODETIC)[good], sd[good], index_of(part)[good]
     way = ned_from_geodetic(place, place[-1])
-    return way, np.maximum(stamps[-1] - stamps, INSTANT), np.hypot(sd, sd[-1])
+    far = np.hypot(way[:, 0], way[:, 1])
+    span = np.maximum(stamps[-1] - stamps, INSTANT)
+    blur = np.hypot(sd, sd[-1])
+    moves = bool((far > np.maximum(clear * blur[:, :2].max(axis=1), MOVES * span)).any())
+    # Half of the span before the newest fix, the velocity is that of the difference.
+    whole = np.hypot(blur / span[:, None], MANOEUVRE * (0.5 * span + time - stamps[-1])[:, None])
+    k = int(np.argmin(whole[:-1, :2].max(axis=1)))
+    return -way[k] / span[k], whole[k], moves
 
 
 def _newest_that_agrees(
