@@ -471,11 +471,11 @@ class EpochLoop:
         while True:
             due = min((q.time[0] for q in self.queues.values() if q.time.size), default=np.inf)
             epoch = min(due, self._next_reference())
-            warmer = self._next_warming(time)
+            warmer = self._next_noise(time)
             if warmer < len(time) and time[warmer] < epoch - SAME_INSTANT:
                 first, done = done, warmer + 1
                 self._propagate(time[first:done], rows[first:done], self.history[first:done])
-                self._warm()
+                self._add_noise()
                 done = self._fixes(done, time, rows)
                 continue
             # 1. The epoch is due now.
@@ -504,16 +504,16 @@ class EpochLoop:
                 unseen = np.empty((1, self.history.shape[1]))
                 self._propagate(np.array([epoch]), part[None, :], unseen)
 
-    def _next_warming(self, time: Array) -> int:
-        """Index of the next step after which a warming unit is told of; their number if none is."""
+    def _next_noise(self, time: Array) -> int:
+        """Index of the next step after which more noise is told of; their number if none is."""
         warming = self.navigator.warming
         due = [one.due(self.warmed) for one in self.navigator.wrong]
         if warming is not None:
             due.append(warming.due(self.warmed, self.begun))
         return int(time.searchsorted(min(due))) if due else len(time)
 
-    def _warm(self) -> None:
-        """Add to the uncertainty of the biases by which these changed as the unit became warmer."""
+    def _add_noise(self) -> None:
+        """Add the noise since the last time: of biases as a unit warms, and of wrong stretches."""
         warming, engine = self.navigator.warming, self.engine
         engine.close()
         filter_ = self.navigator.filter
@@ -592,7 +592,7 @@ class EpochLoop:
         assert rule is not None
         interval = self.navigator.mark_interval * (1.0 - 1e-9)
         queue = self.queues[aid.name]
-        until = self._next_warming(time)
+        until = self._next_noise(time)
         time, rows = time[: until + 1], rows[: until + 1]
         while made < len(time):
             due = int(queue.time.searchsorted(time[-1] + SAME_INSTANT, side="right"))
