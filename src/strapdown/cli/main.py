@@ -24,7 +24,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from strapdown import __version__
 from strapdown.cli.console import RESOURCES, WORDS, logged, tell
-from strapdown.errors import ConfigError, Finding, StrapdownError, Words, printable
+from strapdown.errors import ConfigError, Finding, StrapdownError, printable
 from strapdown.parsers import start_for
 
 _RESEND_S = 0.005
@@ -199,11 +199,9 @@ def run() -> None:
 
 def _tell(finding: Finding) -> None:
     """Tell an error to the program that follows this run, the studio, in its words."""
-    words: Words = "studio"
-    places = ("file", "row", "line", "quantity")
-    where = {key: value for key in places if (value := getattr(finding, key)) is not None}
-    said = {"text": finding.sentence(words), "remedy": finding.advice(words)}
-    tell({"error": {"code": finding.code, "severity": "error", **where, **said}})
+    from strapdown.studio.reading_process import told
+
+    tell({"error": told(finding.replace(severity="error"))})
 
 
 #: Placeholders of proposed options whose value cannot be inferred, for the user to fill in.

@@ -34,7 +34,7 @@ from strapdown.config.spec import (
 from strapdown.config.toml_text import Asked, Page, inline, string
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.bridge import target_of
-from strapdown.studio.questions import HEIGHTS, ROLES, of_each, role_question
+from strapdown.studio.questions import HEIGHTS, ROLES, either_question, of_each, role_question
 
 __all__ = ["KINDS", "Draft", "Kind"]
 
@@ -177,8 +177,7 @@ def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
         with_fixes = [n for n in (samples, *others) if "gnss" in held[n] or n in of_fixes]
         plain = [name for name in with_fixes if name == samples or name not in references]
         if not plain and len(with_fixes) == 1 and ROLES["fixes"] not in keys:
-            question = role_question("fixes", with_fixes, none="It is a reference")
-            asked.append({**question, **_either(with_fixes[0])})
+            asked.append(either_question(with_fixes[0]))
         fixes = one_of("fixes", plain or with_fixes)
     if kind in COMPARED:
         left = [name for name in references if name != fixes or name == samples]
@@ -205,24 +204,6 @@ def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
         tuple(asked),
         tuple(findings),
     )
-
-
-def _either(name: str) -> dict[str, Any]:
-    """Words of the question whether a trajectory is the fixes, or what they are compared with."""
-    said = Finding("studio.fixes-or-reference", severity="error", file=name)
-    return {
-        "code": said.code,
-        "text": said.sentence("file"),
-        "remedy": said.advice("file"),
-        "file": name,
-        "choices": [
-            {"label": "Its positions are the fixes", "set": {ROLES["fixes"]: name}},
-            {
-                "label": "It is a reference, to hold the result against",
-                "set": {ROLES["fixes"]: "", ROLES["reference"]: name},
-            },
-        ],
-    }
 
 
 def _draft_navigation(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:

@@ -14,6 +14,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -174,13 +175,19 @@ def files_of_recorders(paths: Sequence[Path]) -> list[Path]:
 
 def _of_several(path: Path) -> bool:
     """Whether it is a folder that is refused for the recordings of several sensors."""
+    return path.is_dir() and _several_in(path, _digest(path))
+
+
+@lru_cache(maxsize=256)
+def _several_in(folder: Path, _: str) -> bool:
+    """As `_of_several`, of a folder of this digest, which is opened once and not for each look."""
     from strapdown.formats import open_stream
     from strapdown.formats.crash_records import stated_format
 
-    if not path.is_dir() or stated_format(path) is not None:
+    if stated_format(folder) is not None:
         return False
     try:
-        open_stream(path, "imu", None)
+        open_stream(folder, "imu", None)
     except StrapdownError as error:
         return error.finding.code in SEVERAL
     return False

@@ -17,6 +17,7 @@ __all__ = [
     "HEIGHTS",
     "ROLES",
     "axes_question",
+    "either_question",
     "heights_question",
     "of_each",
     "open_question",
@@ -141,6 +142,17 @@ def role_question(role: str, names: Sequence[str], *, none: str = "") -> dict[st
     choices = [_choice(name, {key: name}) for name in names]
     choices += [_choice(none, {key: ""})] if none else []
     return {**_question(finding, "", key, choices, None), "file": None}
+
+
+def either_question(name: str) -> dict[str, Any]:
+    """Return the question whether a trajectory is the fixes, or what the result is held against."""
+    finding = Finding("studio.fixes-or-reference", severity="error", file=name)
+    fixes, reference = ROLES["fixes"], ROLES["reference"]
+    choices = [
+        _choice("Its positions are the fixes", {fixes: name}),
+        _choice("It is a reference, to hold the result against", {fixes: "", reference: name}),
+    ]
+    return _question(finding, name, fixes, choices, None)
 
 
 def open_question(asked: Asked, key: str, unit: str, count: int) -> dict[str, Any]:

@@ -140,16 +140,15 @@ def file_in(place: Path, path: str, manifest: Mapping[str, Any]) -> Path:
 def run(folder: Path, name: str) -> dict[str, Any]:
     """Return the numbers, options, inputs and findings of a result."""
     place, manifest = _opened(folder, name)
+    from strapdown.report.compare_folders import open_run
     from strapdown.report.compare_numbers import is_over_ground
 
-    answer = _answer(place, manifest)
+    answer, sealed = _answer(place, manifest), open_run(place, place.name)
     span: dict[str, Any] = {"from_s": None, "to_s": None}
     with suppress(StrapdownError):
         listed = json.loads((Path(run_stream(folder, name)) / LIST).read_text(encoding="utf-8"))
         span = {key: listed[key] for key in span}
-    from strapdown.report.compare_folders import open_run
-
-    has, sealed = {str(one["name"]) for one in manifest["outputs"]}, open_run(place, place.name)
+    has = {str(one["name"]) for one in manifest["outputs"]}
     against = [_finding(one) for one in _list(answer.get("trust"), "against")[:MOST]]
     noticed = [_finding(one) for one in _list(answer, "findings")[:MOST]]
     said = {(one["code"], one["text"]) for one in noticed}
