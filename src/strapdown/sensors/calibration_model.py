@@ -669,7 +669,7 @@ def _refuse_opposite_sign(stretch: Stretch) -> None:
         raise DataError(
             "calibrate.turn-sign",
             quantity="turns",
-            axis="xyz"[axis],
+            axis=XYZ[axis],
             stated=known.rate / DEG,
             measured=measured / DEG,
             start=known.start,

@@ -283,6 +283,9 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
     of_another = inertial.imu is not None or (
         missing is not None and missing.code == "io.table-of-positions"
     )
+    crash = None if record is None else len(record.channels)
+    if record is None and not of_another:
+        crash = _crash_record(log.path, lacks)
     impact = None if inertial.imu is None else _impact(inertial.imu)
     order = {"error": 0, "warning": 1}
     faults = sorted((f for f in findings if f.severity in order), key=lambda f: order[f.severity])
@@ -304,11 +307,7 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
         "fixes_from": None,
         "fixes_for": None,
         "impact": impact,
-        "crash_record": len(record.channels)
-        if record is not None
-        else None
-        if of_another
-        else _crash_record(log.path, lacks),
+        "crash_record": crash,
         "temperature": _temperature(streams),
     }
     one = LogDiagnosis(
