@@ -12,9 +12,10 @@ import sys
 import threading
 import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -185,6 +186,18 @@ def test_a_worker_that_is_killed_and_a_scheduler_that_is_lost(cheap: Path) -> No
     assert 0 < open_campaign(cheap / "two").dataset.there().sum() < 60
     resume(cheap / "two-running").save(cheap / "two", report=False)
     assert content(cheap / "two") == content(cheap / "whole")
+
+
+def test_a_complete_campaign_has_nothing_to_resume(
+    cheap: Path, run_cli: Callable[..., Any]
+) -> None:
+    """By its name or that of its working folder, which is gone; and it is not replaced."""
+    run_campaign(written(cheap, DRAWN.format(draws=2)), workers=1).save(cheap / "a", report=False)
+    before = content(cheap / "a")
+    for name in ("a", "a-running"):
+        told = run_cli("campaign", "resume", cheap / name, "--no-report")
+        assert (told.code, "no case is left to run" in told.err) == (4, True)
+    assert content(cheap / "a") == before
 
 
 @pytest.mark.slow

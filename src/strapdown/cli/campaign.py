@@ -116,15 +116,19 @@ def resume(
 ) -> None:
     """Go on with a campaign that was ended: the cases without a result are run."""
     from strapdown.campaign.engine import Workers
-    from strapdown.campaign.run import WORKING
+    from strapdown.campaign.run import WORKING, open_campaign
     from strapdown.campaign.run import resume as go_on
+    from strapdown.errors import ConfigError
 
     name = folder.name.removesuffix(WORKING)
+    working, made = folder.with_name(name + WORKING), folder.with_name(name)
+    if not working.exists() and made.exists() and open_campaign(made).sealed:
+        raise ConfigError("campaign.nothing-to-resume", file=str(made))
     _run(
-        folder.with_name(name),
+        made,
         write,
         lambda report, shown: go_on(
-            folder.with_name(name + WORKING),
+            working,
             workers=Workers(workers, scheduler, dashboard),
             progress=report,
             shown=shown,
