@@ -872,7 +872,7 @@ _OPEN = (
     "io.left-out-unusable",
 )
 
-#: Motion that is missing, and axes that contradict gravity.
+#: Motion that is missing, and units and axes that contradict gravity or the course.
 _LIMITS = (
     "io.long-gap",
     "io.rows-after-step-back-left-out",
@@ -882,6 +882,9 @@ _LIMITS = (
     "io.axes-upside-down",
     "io.gyro-axes-differ",
     "io.gyro-turns-against-gravity",
+    "navigation.course-shows-gyro-unit",
+    "navigation.course-turns",
+    "navigation.course-turns-opposite",
 )
 
 
@@ -968,8 +971,8 @@ def _navigation(one: LogDiagnosis) -> list[Finding]:
             sd=float(np.median(finite)) if finite.size else math.inf,
         )
     )
-    found += [f for f in one.faults if f.code.startswith("navigation.") and f not in found]
-    found += [f for f in one.faults if f.code in _LIMITS]
+    listed = [f for f in one.faults if f.code.startswith("navigation.") or f.code in _LIMITS]
+    found += [f for f in listed if f not in found]
     return found
 
 

@@ -39,6 +39,7 @@ from strapdown.navigation.measurements.gnss_clock import (
     time_offset,
     velocity_delay,
 )
+from strapdown.navigation.measurements.gnss_course import check_turns
 from strapdown.navigation.measurements.gnss_readiness import (
     check_fixes,
     float_position_sd,
@@ -248,6 +249,7 @@ def propose(
         # Refuse before a file is written whatever the run would refuse.
         check_fixes(fixes)
         check_overlap(fixes, imu, 0.0)
+        findings = (*findings, *check_turns(fixes, imu))
     place, start = site, recording.start
     if not place and start is not None:
         place = (start.lat_deg, start.lon_deg, start.alt)

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from strapdown._kernels import piecewise
 from strapdown.dsp.cubics import spline
-from strapdown.dsp.samples import running_integral
 from strapdown.errors import DataError, Finding
 from strapdown.frames import place_difference
+from strapdown.navigation.measurements.gnss_course import LEAST_STEPS, courses, integrals
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD, usable
-from strapdown.tables.checks import RELATIVE, channels_of, index_of, source_of, values_of
-from strapdown.tables.on_disk import filled
+from strapdown.tables.checks import RELATIVE, index_of, source_of, values_of
 
 __all__ = [
     "TimeOffset",
@@ -41,17 +40,15 @@ UNIX = (7.9e8, 2.21e9)
 LARGEST, STEP, FINE_STEP = 20.0, 0.1, 0.025
 #: Steps about the result: whose misfits count, and to which a parabola is fitted.
 AROUND, FITTED = 20, 4
-#: Interval of the stored integrals of the sensors, s.
-NODES = 0.02
 #: Below this speed, m/s, a course is not usable.
 LEAST_SPEED = 3.0
 #: Lever arm of an antenna from the unsteered axle, m, one standard deviation of an element; the
 #: time over which a rate at an instant is taken, s; and the standard deviation of a result from
 #: steps whose residuals are correlated over that from independent ones.
 ARM, ABOUT, CORRELATED = 1.0, 0.1, 2.0
-#: Number of steps needed; fraction of the changes that the sensors must explain; and factor by
-#: which the best offset's residual must be below that of any other more than a second from it.
-LEAST_STEPS, LEAST_SHARE, CLEAR = 20, 0.6, 1.3
+#: Fraction of the changes that the sensors must explain; and factor by which the best offset's
+#: residual must be below that of any other more than a second from it.
+LEAST_SHARE, CLEAR = 0.6, 1.3
 #: Share of a sum of squares that normal equations round to.
 ROUNDED = 1e-14
 #: Of more steps the first are used: two hours of fixes each second know an offset to milliseconds.
@@ -173,7 +170,7 @@ def time_offset(
     coefficients are fitted by least squares, with a prior for the arm; the least misfit is refined
     by a parabola, whose curvature gives the standard deviation.
     """
-    told = _courses(gnss, velocity_delay)
+    told = courses(gnss, velocity_delay)
     if told is None:
         return None
     at, velocity = told
@@ -246,20 +243,6 @@ def find_time_offset(
     ]
 
 
-def _courses(gnss: pd.DataFrame, delay: float) -> tuple[Array, Array] | None:
-    """Times on the clock of the positions, and horizontal velocity then."""
-    time = index_of(gnss)
-    by_velocity = usable(gnss, VELOCITY_SD[:2])
-    if by_velocity.sum() > LEAST_STEPS:
-        return time[by_velocity] - delay, values_of(gnss, VELOCITY)[by_velocity, :2]
-    good = usable(gnss, POSITION_SD[:2])
-    if good.sum() <= LEAST_STEPS + 1:
-        return None
-    time, place = time[good], values_of(gnss, GEODETIC)[good]
-    moved = place_difference(place[1:], place[:-1])[:, :2]
-    return 0.5 * (time[1:] + time[:-1]), moved / np.diff(time)[:, None]
-
-
 def _best(
     at: Array,
     change: Array,
@@ -294,10 +277,10 @@ def _best(
     weight = 1.0 / (0.5 * (per_rate[1:] + per_rate[:-1]))[used]
     change, lasting = weight * change[used], weight * (end - begin)[used]
     means = imu.attrs["sampling"] == "mean"
-    nodes, sums = _integrals(stamps, imu, columns, means)
+    nodes, sums = integrals(stamps, imu, columns, means)
     turned = sums
     if columns != GYRO:
-        turned = _integrals(stamps, imu, GYRO, means)[1]
+        turned = integrals(stamps, imu, GYRO, means)[1]
 
     between, before, after = (np.empty((len(at), 3)) for _ in range(3))
     X = np.empty((len(change), 7))
@@ -359,21 +342,6 @@ def _best(
     sd = math.sqrt(variance * max(1.0 / second, flat))
     offset = float(fine[best] + off)
     return TimeOffset(offset, sd, share, by)
-
-
-def _integrals(
-    stamps: Array, imu: pd.DataFrame, columns: list[str], means: bool
-) -> tuple[Array, Array]:
-    """Integrals of three channels, (m, 3), at times no closer than the search needs."""
-    last = len(stamps) - 1
-    steps = filled(last, lambda part: np.diff(stamps[part.start : part.stop + 1]))
-    # Steps are rounded decimal fractions.
-    each = max(1, int(NODES / float(np.median(steps, overwrite_input=True)) + 1e-6))
-    del steps
-    kept = np.append(np.arange(0, last, each), last)
-    channels = channels_of(imu, columns)
-    sums = [running_integral(stamps, one, means=means)[kept] for one in channels]
-    return stamps[kept], np.column_stack(sums)
 
 
 def _difference(time: Array, stamps: Array, *, shared: bool) -> tuple[str, dict[str, Any]]:

@@ -21,6 +21,7 @@ from strapdown.navigation.measurements.gnss_clock import (
     find_velocity_delay,
     velocity_delay,
 )
+from strapdown.navigation.measurements.gnss_course import check_turns
 from strapdown.tables import (
     GEODETIC,
     POSITION_SD,
@@ -71,7 +72,7 @@ def gnss_readiness(
     ------
     DataError
         The fixes cannot be used as they are (`gnss_checks.check_fixes`,
-        `gnss_clock.check_overlap`).
+        `gnss_clock.check_overlap`, `gnss_course.check_turns`).
     """
     aid = aid or Gnss(name="gnss")
     found = check_fixes(table)
@@ -86,6 +87,7 @@ def gnss_readiness(
     delay = aid.velocity_delay
     if not delay and (measured := velocity_delay(table)) is not None:
         delay = measured.delay
+    found += check_turns(table, imu, delay)
     found += find_time_offset(table, imu, aid.time_offset, delay, aid.time_offset_sd)
     return tuple(found)
 

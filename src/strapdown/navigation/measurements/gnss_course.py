@@ -1,0 +1,206 @@
+"""Course of a receiver, and what the integrals of the inertial sensors have to do with it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.constants import MAD_TO_SD
+from strapdown.dsp.samples import running_integral
+from strapdown.errors import DataError, Finding
+from strapdown.frames import place_difference
+from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD, usable
+from strapdown.tables.checks import channels_of, index_of, source_of, values_of
+from strapdown.tables.on_disk import filled
+
+__all__ = ["LEAST_STEPS", "TurnRatio", "check_turns", "courses", "integrals", "turn_ratio"]
+
+Array = NDArray[np.float64]
+
+#: Number of steps of a course needed.
+LEAST_STEPS = 20
+#: Interval of the stored integrals of the sensors, s.
+NODES = 0.02
+#: A turn is taken over so many seconds: an offset of the clocks is short against it.
+WINDOW = 10.0
+#: Positions over which a course is taken for a turn are so far apart, s, and at most so far.
+COURSE_STEP, LONGEST = 1.0, 2.5
+#: Speed from which a course counts as one, m/s.
+MOVES = 1.0
+#: Windows needed; share of the turns that the gyros must explain; significance of their ratio;
+#: residuals, in standard deviations by the median, that do not count; and the share that must, as
+#: gyros that measure no turn explain whatever is left without the turns.
+LEAST_WINDOWS, LEAST_SHARE, SIGNIFICANT, GROSS, COUNT = 10, 0.6, 5.0, 5.0, 0.8
+#: A bank of 60° makes a ratio of two, and mirrored axes one below zero.
+FAR = 3.0
+#: deg/s for a rad/s, and by how much the ratio may differ from that of two units.
+DEGREES, ABOUT = 180.0 / math.pi, 1.5
+#: Mean specific force that is gravity, m/s².
+GRAVITY = (8.0, 12.0)
+
+
+@dataclass(frozen=True)
+class TurnRatio:
+    """By how much the gyros turn about the vertical, over the change of a course.
+
+    Attributes
+    ----------
+    ratio, sd : float
+    share : float
+        Of the changes of the course that the gyros explain, whatever their ratio.
+    windows : int
+        Of ten seconds each.
+    """
+
+    ratio: float
+    sd: float
+    share: float
+    windows: int
+
+
+def courses(gnss: pd.DataFrame, delay: float, step: float = 0.0) -> tuple[Array, Array] | None:
+    """Times on the clock of the positions, (n,), and horizontal velocity then, (n, 2), m/s.
+
+    Parameters
+    ----------
+    delay : float, s
+        Of the velocities.
+    step : float, s
+        Without velocities, at least so long between the positions whose difference is taken.
+    """
+    time = index_of(gnss)
+    by_velocity = usable(gnss, VELOCITY_SD[:2])
+    if by_velocity.sum() > LEAST_STEPS:
+        return time[by_velocity] - delay, values_of(gnss, VELOCITY)[by_velocity, :2]
+    good = np.flatnonzero(usable(gnss, POSITION_SD[:2]))
+    if step and len(good) > 1:
+        good = good[:: max(1, round(step / float(np.median(np.diff(time[good])))))]
+    if len(good) <= LEAST_STEPS + 1:
+        return None
+    time, place = time[good], values_of(gnss, GEODETIC)[good]
+    moved = place_difference(place[1:], place[:-1])[:, :2]
+    return 0.5 * (time[1:] + time[:-1]), moved / np.diff(time)[:, None]
+
+
+def integrals(
+    stamps: Array, imu: pd.DataFrame, columns: list[str], means: bool
+) -> tuple[Array, Array]:
+    """Integrals of three channels, (m, 3), at times, (m,), no closer than a course needs.
+
+    Parameters
+    ----------
+    means : bool
+        Each sample is the mean over the interval that ends with it.
+    """
+    last = len(stamps) - 1
+    steps = filled(last, lambda part: np.diff(stamps[part.start : part.stop + 1]))
+    # Steps are rounded decimal fractions.
+    each = max(1, int(NODES / float(np.median(steps, overwrite_input=True)) + 1e-6))
+    del steps
+    kept = np.append(np.arange(0, last, each), last)
+    channels = channels_of(imu, columns)
+    sums = [running_integral(stamps, one, means=means)[kept] for one in channels]
+    return stamps[kept], np.column_stack(sums)
+
+
+def turn_ratio(
+    gnss: pd.DataFrame, imu: pd.DataFrame, velocity_delay: float = 0.0
+) -> TurnRatio | None:
+    """Compare turns by the gyros with those of the course, in windows of ten seconds.
+
+    Parameters
+    ----------
+    velocity_delay : float, s
+        Of the receiver.
+
+    Returns
+    -------
+    TurnRatio or None
+        None if the course turns too little or too rarely, the gyros do not explain it, or the
+        accelerometers do not measure gravity.
+
+    Notes
+    -----
+    Whatever the mounting, the mean specific force is upward, and the rate about it is that of the
+    heading: the ratio is 1 but for banks (1/cos of the bank and less) and sideslip. The bias of
+    the gyros is a second unknown; the standard deviation is by each window's residual from the
+    fit to the others (HC3 of MacKinnon and White 1985), as one turn may decide.
+    """
+    told = courses(gnss, velocity_delay, COURSE_STEP)
+    stamps = index_of(imu)
+    force = np.array([float(one.mean()) for one in channels_of(imu, ACCEL)])
+    size = float(np.linalg.norm(force))
+    if told is None or not GRAVITY[0] < size < GRAVITY[1]:
+        return None
+    at, velocity = told
+    course = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
+    nodes, sums = integrals(stamps, imu, GYRO, imu.attrs["sampling"] == "mean")
+    turned = np.interp(at, nodes, sums @ (-force / size))
+    usual = (np.hypot(*velocity.T) > MOVES) & (at >= stamps[0]) & (at <= stamps[-1])
+    breaks = np.cumsum(~usual | np.append(False, np.diff(at) > LONGEST))
+    pairs = []
+    begin = 0
+    ends = np.searchsorted(at, at + WINDOW)
+    while begin < len(at) and (end := int(ends[begin])) < len(at):
+        whole = usual[begin] and breaks[begin] == breaks[end]
+        if whole:
+            pairs.append((begin, end))
+        begin = end if whole else begin + 1
+    if len(pairs) < LEAST_WINDOWS:
+        return None
+    first, last = np.array(pairs).T
+    change = course[last] - course[first]
+    X = np.column_stack([turned[last] - turned[first], at[last] - at[first]])
+    kept = np.ones(len(change), dtype=bool)
+    for _ in range(10):
+        fit, *_ = np.linalg.lstsq(X[kept], change[kept], rcond=None)
+        left = np.abs(change - X @ fit)
+        before, kept = kept, left <= GROSS * MAD_TO_SD * float(np.median(left[kept]))
+        if np.array_equal(before, kept):
+            break
+    X, change, left = X[kept], change[kept], left[kept]
+    if len(change) < max(LEAST_WINDOWS, COUNT * len(kept)):
+        return None
+    inverse = np.linalg.pinv(X.T @ X)
+    alone = left / np.maximum(1.0 - np.einsum("ni,ij,nj->n", X, inverse, X), 0.1)
+    spread = inverse @ (X.T * alone**2) @ X @ inverse
+    slope, sd = float(fit[0]), math.sqrt(float(spread[0, 0]))
+    steady = change - X[:, 1] * float(X[:, 1] @ change) / float(X[:, 1] @ X[:, 1])
+    share = 1.0 - float(left @ left) / max(float(steady @ steady), 1e-300)
+    if share < LEAST_SHARE or abs(slope) <= SIGNIFICANT * sd:
+        return None
+    return TurnRatio(1.0 / slope, sd / slope**2, share, len(change))
+
+
+def check_turns(
+    gnss: pd.DataFrame, imu: pd.DataFrame, velocity_delay: float = 0.0
+) -> list[Finding]:
+    """Refuse gyros of another unit, and report such as turn otherwise than the course.
+
+    Raises
+    ------
+    DataError
+        The gyros turn by as much as deg/s are more than rad/s, or less.
+    """
+    found = turn_ratio(gnss, imu, velocity_delay)
+    if found is None or 1.0 / FAR < found.ratio < FAR:
+        return []
+    facts: dict[str, Any] = {
+        "file": source_of(imu),
+        "quantity": "gyro",
+        "fixes": source_of(gnss),
+        "ratio": found.ratio,
+        "sd": found.sd,
+        "share": found.share,
+        "windows": found.windows,
+    }
+    for unit, factor in (("deg/s", DEGREES), ("rad/s", 1.0 / DEGREES)):
+        if factor / ABOUT < found.ratio < factor * ABOUT:
+            raise DataError("navigation.course-shows-gyro-unit", unit=unit, **facts)
+    code = "navigation.course-turns-opposite" if found.ratio < 0.0 else "navigation.course-turns"
+    return [Finding(code, **facts)]

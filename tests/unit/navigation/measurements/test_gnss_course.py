@@ -1,0 +1,114 @@
+"""Turns by the gyros against those of the course of fixes."""
+
+import numpy as np
+import pytest
+
+import strapdown as sd
+from strapdown.errors import DataError
+from strapdown.navigation.measurements.gnss_course import check_turns, turn_ratio
+from strapdown.simulation.gnss import GnssReceiver
+from strapdown.tables import ACCEL, GYRO
+
+DEGREES = 180.0 / np.pi
+
+
+def drive(rate=5.0, speed_noise=0.1, place_noise=0.5, seed=1, **errors):
+    receiver = GnssReceiver(
+        rate=rate, position_noise=place_noise, velocity_noise=speed_noise, **errors
+    )
+    made = sd.simulate("drive-town", seed=seed, rate_hz=50.0, receiver=receiver)
+    return made.gnss, made.imu
+
+
+def scaled(imu, columns, by):
+    out = imu.copy()
+    out.attrs = imu.attrs
+    out[columns] = out[columns] * by
+    return out
+
+
+def without_velocities(fixes):
+    out = fixes.copy()
+    out.attrs = fixes.attrs
+    out[["VN_sd", "VE_sd", "VD_sd"]] = np.inf
+    return out
+
+
+@pytest.mark.parametrize("rate", [1.0, 5.0, 10.0])
+def test_gyros_turn_as_far_as_the_course(rate):
+    """But for sideslip and the lever arm; five standard deviations of its own."""
+    found = turn_ratio(*drive(rate))
+    assert abs(found.ratio - 1.0) < 5.0 * found.sd < 0.25
+    assert found.share > 0.98
+
+
+def test_positions_alone_at_a_high_rate_suffice():
+    """Between fixes 0.1 s apart, 0.2 m of noise are 2.8 m/s."""
+    fixes, imu = drive(10.0, place_noise=0.2)
+    found = turn_ratio(without_velocities(fixes), imu)
+    assert abs(found.ratio - 1.0) < 5.0 * found.sd < 0.5
+
+
+@pytest.mark.parametrize(("by", "unit"), [(DEGREES, "deg/s"), (1.0 / DEGREES, "rad/s")])
+def test_gyros_of_another_unit_are_refused(by, unit):
+    fixes, imu = drive()
+    with pytest.raises(DataError) as caught:
+        check_turns(fixes, scaled(imu, GYRO, by))
+    assert caught.value.finding.code == "navigation.course-shows-gyro-unit"
+    assert caught.value.finding.data["unit"] == unit
+
+
+@pytest.mark.parametrize(
+    ("columns", "by", "code"),
+    [
+        (GYRO, -1.0, "navigation.course-turns-opposite"),
+        (["gyro_z", "accel_z"], -1.0, "navigation.course-turns-opposite"),  # mirrored, as read
+        (GYRO, 4.0, "navigation.course-turns"),
+        (GYRO, 0.25, "navigation.course-turns"),
+    ],
+)
+def test_gyros_that_turn_otherwise_are_reported(columns, by, code):
+    """A left-handed triad turns opposite about the vertical, which gravity does not show."""
+    fixes, imu = drive()
+    if columns != GYRO:
+        imu = scaled(imu, ["accel_z"], -1.0)  # z up, read as a right-handed triad
+        columns = []
+    (found,) = check_turns(fixes, scaled(imu, columns, by) if columns else imu)
+    assert found.code == code
+
+
+def test_a_right_unit_is_not_reported():
+    assert check_turns(*drive()) == []
+
+
+def test_faults_of_fixes_do_not_count():
+    """One fix in twenty is off by 60 m: the ratio is that of the others."""
+    fixes, imu = drive(5.0, place_noise=0.5)
+    fixes = without_velocities(fixes)
+    rows = np.random.default_rng(3).random(len(fixes)) < 0.02
+    fixes.loc[rows, "lat"] += 60.0 / 111_000.0
+    found = turn_ratio(fixes, imu)
+    assert abs(found.ratio - 1.0) < 5.0 * found.sd
+
+
+def test_no_ratio_without_evidence():
+    fixes, imu = drive()
+    assert turn_ratio(fixes.iloc[:120], imu) is None  # too few windows
+    slow = fixes.copy()
+    slow.attrs = fixes.attrs
+    slow[["VN", "VE"]] *= 0.01
+    assert turn_ratio(slow, imu) is None  # a course of noise
+    noisy = scaled(imu, GYRO, 0.0)
+    noisy[GYRO] += np.random.default_rng(1).normal(0.0, 0.1, (len(imu), 3))
+    assert turn_ratio(fixes, noisy) is None  # gyros that do not measure
+    assert turn_ratio(fixes, scaled(imu, ACCEL, 0.02)) is None  # no gravity
+
+
+@pytest.mark.parametrize("delay", [0.0, 1.0])
+def test_an_offset_of_a_second_does_not_matter(delay):
+    fixes, imu = drive(5.0)
+    late = fixes.copy()
+    late.attrs = fixes.attrs
+    late.index = late.index + delay
+    found = turn_ratio(late, imu)
+    assert abs(found.ratio - 1.0) < max(5.0 * found.sd, 0.15)
