@@ -262,6 +262,7 @@ def test_a_draft_of_foreign_columns_and_of_fixes_without_standard_deviations(run
     assert refused.code == 4 and "--gnss-position-sd 5" in refused.err
 
 
+@pytest.mark.slow
 def test_the_car_is_navigated_from_its_raw_files(recordings, run_cli, tmp_path, undrawn_here):
     """Alignment, time offset and shaking axes by themselves."""
     folder = recordings("car_rtk")
