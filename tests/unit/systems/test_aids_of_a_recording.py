@@ -265,7 +265,7 @@ def test_a_folder_of_a_phone_is_navigated_with_the_fixes_in_it(tmp_path):
         "Location.csv",
     ]
     fixes_of = FixesTable(path=str(folder), datum_height_m=0.0)
-    log = LogTable(path=str(folder))
+    log = LogTable(path=str(folder), duration_s=90.0)
     draft = draft_navigation(log, folder=tmp_path, axes="x,-y,-z", gnss=fixes_of)
     made = tmp_path / "navigate.toml"
     made.write_text(draft.text.replace('"?"', "0.3"), encoding="utf-8")
