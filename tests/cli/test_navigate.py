@@ -200,6 +200,7 @@ def test_fixes_are_kept_back_to_score_by(run_cli, tmp_path, undrawn_here):
     assert run_cli("verify", tmp_path / "true").code == 0
 
 
+@pytest.mark.slow
 def test_a_log_is_navigated_directly_and_as_its_draft_says(run_cli, tmp_path, undrawn_here):
     write_drive(tmp_path)
     log, fixes = tmp_path / "drive.csv", tmp_path / "fixes.csv"

@@ -95,6 +95,7 @@ def test_the_noise_of_a_height_is_its_scatter_and_what_lasts(recording):
     assert tables["barometer"]["height_sd_m"] == pytest.approx(expected, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_barometer_is_proposed_and_holds_the_height(recording, tmp_path, monkeypatch):
     proposed = []
     monkeypatch.setattr(
