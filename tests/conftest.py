@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import gc
 import io
+import os
 import sys
+from collections.abc import Generator
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,23 +15,38 @@ import pytest
 from hypothesis import HealthCheck, settings
 from tests.recorded import DATA, without
 
+Hook = Generator[None, pytest.CollectReport, pytest.CollectReport]
+
 # Tests assert no times: on a busy machine a draw may wait for half a minute.
 settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("untimed")
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the crash tests in the middle: there a second worker begins.
+def _of_second_worker(config: pytest.Config) -> bool:
+    """Whether this is every second process of those that share the tests."""
+    worker = getattr(config, "workerinput", {}).get("workerid", "gw0")
+    return bool(int(worker.removeprefix("gw")) % 2)
 
-    The first worker compiles the filter's kernels, a third of all compilation; a second one that
-    began with navigation would compile them at the same time.
-    """
-    crash, others = [], []
-    for item in items:
-        (crash if "tests/unit/crash/" in item.path.as_posix() else others).append(item)
-    half = (len(items) + 1) // 2
-    items[:] = [*others[:half], *crash, *others[half:]]
+
+def pytest_configure() -> None:
+    """Let modules be compiled once, and not anew by each worker and each command of a test."""
+    sys.dont_write_bytecode = False
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector) -> Hook:
+    """Let the second worker collect from the end: each compiles a half, and finds the other."""
+    report = yield
+    if isinstance(collector, pytest.Directory) and _of_second_worker(collector.config):
+        report.result = report.result[::-1]
+    return report
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Sort what was collected from either end: all workers have one order."""
+    items.sort(key=lambda item: item.path.parts)
 
 
 def pytest_collection_finish() -> None:

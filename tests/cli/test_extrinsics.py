@@ -108,6 +108,7 @@ def errors_in_sd(run, drive):
     return {e.name: (e.value - known[e.name]) / e.sd for e in run.result.estimates}
 
 
+@pytest.mark.slow
 def test_the_antenna_of_a_drive(monkeypatch):
     arm, offset = (0.8, 0.3, -1.2), 0.15
     receiver = GnssReceiver(

@@ -200,6 +200,7 @@ def test_fixes_are_kept_back_to_score_by(run_cli, tmp_path, undrawn_here):
     assert run_cli("verify", tmp_path / "true").code == 0
 
 
+@pytest.mark.slow
 def test_a_log_is_navigated_directly_and_as_its_draft_says(run_cli, tmp_path, undrawn_here):
     write_drive(tmp_path)
     log, fixes = tmp_path / "drive.csv", tmp_path / "fixes.csv"
@@ -262,6 +263,7 @@ def test_a_draft_of_foreign_columns_and_of_fixes_without_standard_deviations(run
     assert refused.code == 4 and "--gnss-position-sd 5" in refused.err
 
 
+@pytest.mark.slow
 def test_the_car_is_navigated_from_its_raw_files(recordings, run_cli, tmp_path, undrawn_here):
     """Alignment, time offset and shaking axes by themselves."""
     folder = recordings("car_rtk")

@@ -22,7 +22,6 @@ from strapdown.live.sources import LineSource, open_source
 
 __all__ = [
     "begin_journal",
-    "configured_session",
     "let_go_of_received",
     "open_lines",
     "output_of",
@@ -99,24 +98,6 @@ def remove_received(journal: Journal, bundle: Path) -> None:
 def _all_copied(bundle: Path) -> bool:
     """Return whether a bundle holds all of its inputs."""
     return all(item["kept"] == "copy" for item in read_manifest(bundle)["inputs"])
-
-
-def configured_session(path: Path, *, pace: bool = False) -> Path | None:
-    """Return the folder of a session that navigated, by itself or its journal; None of others.
-
-    `pace`: whether it is to be played at a pace. ConfigError: it is, and computed an attitude,
-    which is no navigation to play.
-    """
-    from strapdown.formats.live_journal import run_of, session_folder
-
-    folder = session_folder(path) if path.exists() else None
-    if folder is None or (run := run_of(folder))["command"] != "live":
-        return None
-    if isinstance(run.get("configuration"), dict):
-        return folder
-    if pace:
-        raise ConfigError("live.pace-of-attitude", file=str(path), quantity="--pace")
-    return None
 
 
 def let_go_of_received(bundle: Path) -> None:

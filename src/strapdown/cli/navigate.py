@@ -155,7 +155,6 @@ def navigate(
     """Find position, velocity and attitude over a record, by inertial sensors and measurements."""
     from strapdown.bundle import write_latency
     from strapdown.cli.console import WORDS, print_seal
-    from strapdown.cli.live_folder import configured_session, let_go_of_received, warner
     from strapdown.cli.result_folder import (
         claim,
         default_folder,
@@ -211,10 +210,11 @@ def navigate(
     refuse_without_live(own_of_live)
     session = None if own or any(value is not None for value in given.values()) else source
     with_pace = played is not None
-    received = None if session is None else configured_session(session, pace=with_pace)
+    received = None if session is None else _session_that_navigated(session, pace=with_pace)
 
     def compute(report: Progress) -> NavigationRun:
         if received is not None:
+            from strapdown.cli.live_folder import warner
             from strapdown.cli.navigate_live import navigate_session
 
             return navigate_session(received, folder, report, played, warner(write.quiet))
@@ -230,6 +230,8 @@ def navigate(
 
     done = run_and_save(compute, folder, write, "navigation.json", latency)
     if received is not None:
+        from strapdown.cli.live_folder import let_go_of_received
+
         let_go_of_received(folder)
     if done is not None:
         from strapdown.cli.navigate_tables import print_latency, print_navigation
@@ -240,6 +242,24 @@ def navigate(
         if found is not None:
             print_latency(found, f"played, pace {pace}")
         print_seal(seal, "navigation.json", write.no_report)
+
+
+def _session_that_navigated(path: Path, *, pace: bool = False) -> Path | None:
+    """Return the folder of a session that navigated, by itself or its journal; None of others.
+
+    `pace`: whether it is to be played at a pace. ConfigError: it is, and computed an attitude,
+    which is no navigation to play.
+    """
+    from strapdown.formats.live_journal import run_of, session_folder
+
+    folder = session_folder(path) if path.exists() else None
+    if folder is None or (run := run_of(folder))["command"] != "live":
+        return None
+    if isinstance(run.get("configuration"), dict):
+        return folder
+    if pace:
+        raise ConfigError("live.pace-of-attitude", file=str(path), quantity="--pace")
+    return None
 
 
 def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 from collections.abc import Iterator
 from typing import Annotated, Literal
@@ -30,6 +29,7 @@ from strapdown.formats.recording import as_stated
 from strapdown.sensors.bridge import target_of
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import NAMED_AXES, check_axes_matrix
+from strapdown.tables.sample_clock import ends_of_part
 from strapdown.units import parse_unit
 
 Matrix = tuple[Triple, Triple, Triple]
@@ -72,18 +72,6 @@ class LogTable(Spec):
     def part_s(self, first: float) -> tuple[float, float]:
         """Return begin and end of the part to use, as `ends_of_part`."""
         return ends_of_part(first, self.from_s, self.to_s, self.duration_s)
-
-
-def ends_of_part(
-    first: float, from_s: float | None, to_s: float | None, duration_s: float | None
-) -> tuple[float, float]:
-    """Return begin and end of a part of a record, s, infinite where none is stated.
-
-    `first`: first stamp of the record, s, from which a length counts that has no begin.
-    """
-    if duration_s is not None:
-        to_s = (first if from_s is None else from_s) + duration_s
-    return -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
 
 
 class FixesTable(Spec):

@@ -320,10 +320,6 @@ class EntryState:
         block = self.covariance[ATTITUDE, ATTITUDE]
         return np.asarray(angles_sd(self.state.roll_pitch_heading[None], block[None])[0])
 
-    def with_biases_off(self, imu: pd.DataFrame) -> pd.DataFrame:
-        """Return an Imu table corrected for the estimated biases."""
-        return biases_off(imu, np.array(self.gyro_bias), np.array(self.accel_bias))
-
 
 def biases_off(imu: pd.DataFrame, gyro_bias: Array, accel_bias: Array) -> pd.DataFrame:
     """Return a copy of an Imu table less biases in rad/s and m/s²."""

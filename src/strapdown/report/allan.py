@@ -24,7 +24,7 @@ from strapdown.report.document import (
     run_again,
     section,
 )
-from strapdown.report.report_bundle import ReportBundle, finite, with_page
+from strapdown.report.report_bundle import bundle_by_specification, finite, with_page
 from strapdown.report.values import duration_words
 from strapdown.sensors.bridge import target_of
 from strapdown.sensors.noise_terms import ChannelNoise, NoiseTerm
@@ -58,14 +58,6 @@ METHOD = (
     "The sensor's noise is Gaussian and does not change with time. The effect of temperature is "
     "estimated beside it where the log has a temperature that changes.",
 )
-
-
-def _configuration(result: AllanRun) -> dict[str, Any]:
-    return {"allan": result.spec.plain()}
-
-
-def _run(configuration: dict[str, Any]) -> AllanRun:
-    return run_allan(AllanSpec.checked(configuration["allan"]))
 
 
 def _write_data(result: AllanRun, folder: Path) -> None:
@@ -309,4 +301,6 @@ def allan_chart(result: AllanRun, kind: str = "allan") -> Chart:
 
 
 #: Page, JSON, deviations and sensor file of a record at rest.
-ALLAN = ReportBundle("allan", _configuration, _run, with_page(_write_data, allan_document))
+ALLAN = bundle_by_specification(
+    "allan", AllanSpec, run_allan, with_page(_write_data, allan_document)
+)

@@ -24,7 +24,7 @@ from strapdown.report.document import (
     run_again,
     section,
 )
-from strapdown.report.report_bundle import ReportBundle, finite, with_page
+from strapdown.report.report_bundle import bundle_by_specification, finite, with_page
 from strapdown.report.values import about
 from strapdown.rotation import rotation_vector_from_dcm
 from strapdown.sensors.calibration import correlations
@@ -91,14 +91,6 @@ METHOD = (
     "latitude; its horizontal part, in an unknown direction, counts as noise.",
     "The bias is that of these logs: what it changes by from day to day is not in its bound.",
 )
-
-
-def _configuration(result: CalibrateRun) -> dict[str, Any]:
-    return {"calibrate": result.spec.plain()}
-
-
-def _run(configuration: dict[str, Any]) -> CalibrateRun:
-    return run_calibrate(CalibrateSpec.checked(configuration["calibrate"]))
 
 
 def _write_data(result: CalibrateRun, folder: Path) -> None:
@@ -394,6 +386,6 @@ def bounds_chart(result: CalibrateRun) -> Chart | None:
 
 
 #: Page, JSON, calibration file and rests of a calibration.
-CALIBRATE = ReportBundle(
-    "calibrate", _configuration, _run, with_page(_write_data, calibrate_document)
+CALIBRATE = bundle_by_specification(
+    "calibrate", CalibrateSpec, run_calibrate, with_page(_write_data, calibrate_document)
 )

@@ -45,7 +45,7 @@ from strapdown.report.document import (
     run_again,
     section,
 )
-from strapdown.report.report_bundle import ReportBundle, finite, with_page
+from strapdown.report.report_bundle import bundle_by_specification, finite, with_page
 from strapdown.report.values import duration_words, instant, small
 from strapdown.systems.doctor import USES, Diagnosis, LogDiagnosis, refused_fixes, run_doctor
 from strapdown.tables import ACCEL, GEODETIC, GYRO, VELOCITY, VELOCITY_SD, find_gaps
@@ -58,14 +58,6 @@ MOST_RESTS, MOST_BANDS = 12, 40
 BUCKETS = 500
 #: Seconds since 1970 beyond which a date has no year of four digits.
 LATEST = 2.5e11
-
-
-def _configuration(result: Diagnosis) -> dict[str, Any]:
-    return {"doctor": result.spec.plain()}
-
-
-def _run(configuration: dict[str, Any]) -> Diagnosis:
-    return run_doctor(DoctorSpec.checked(configuration["doctor"]))
 
 
 def _write_data(result: Diagnosis, folder: Path) -> None:
@@ -522,6 +514,6 @@ def fix_chart(one: LogDiagnosis, slug: str = "") -> Chart | None:
 
 
 #: Page and JSON of a diagnosis.
-DOCTOR = ReportBundle(
-    "doctor", _configuration, _run, with_page(_write_data, doctor_document, figures=False)
+DOCTOR = bundle_by_specification(
+    "doctor", DoctorSpec, run_doctor, with_page(_write_data, doctor_document, figures=False)
 )

@@ -24,7 +24,7 @@ from strapdown.report.document import (
     run_again,
     section,
 )
-from strapdown.report.report_bundle import ReportBundle, finite, with_page
+from strapdown.report.report_bundle import bundle_by_specification, finite, with_page
 from strapdown.report.values import bounded
 from strapdown.systems.extrinsics_run import ExtrinsicsRun, run_extrinsics
 from strapdown.tables.checks import index_of
@@ -65,14 +65,6 @@ METHOD_GNSS = (
     "fixes would use them twice, with arm and offset as they were assumed.",
     "A state is observable where the record leaves a quarter of its variance at most.",
 )
-
-
-def _configuration(result: ExtrinsicsRun) -> dict[str, Any]:
-    return {"extrinsics": result.spec.plain()}
-
-
-def _run(configuration: dict[str, Any]) -> ExtrinsicsRun:
-    return run_extrinsics(ExtrinsicsSpec.checked(configuration["extrinsics"]))
 
 
 def _write_data(result: ExtrinsicsRun, folder: Path) -> None:
@@ -323,6 +315,6 @@ def match_chart(result: ExtrinsicsRun) -> Chart:
 
 
 #: Page, JSON and TOML of two sensors.
-EXTRINSICS = ReportBundle(
-    "extrinsics", _configuration, _run, with_page(_write_data, extrinsics_document)
+EXTRINSICS = bundle_by_specification(
+    "extrinsics", ExtrinsicsSpec, run_extrinsics, with_page(_write_data, extrinsics_document)
 )

@@ -19,6 +19,7 @@ from strapdown.systems.one_thread import one_thread
 from strapdown.tables.checks import index_of
 
 if TYPE_CHECKING:
+    from strapdown.config.reading import FileSpec
     from strapdown.report.document import Document
 
 
@@ -30,7 +31,17 @@ class Ran(Protocol):
         """Input files with their roles."""
 
 
+class Specified(Ran, Protocol):
+    """A run that its specification alone makes."""
+
+    @property
+    def spec(self) -> FileSpec:
+        """What it was made by."""
+
+
 R = TypeVar("R", bound=Ran)
+M = TypeVar("M", bound=Specified)
+F = TypeVar("F", bound="FileSpec")
 T = TypeVar("T")
 WriteFiles = Callable[[R, Path, str, tuple[str, ...], Progress], None]
 
@@ -160,6 +171,18 @@ class ReportBundle(Generic[R]):
             typst_library()  # before the run, as its PDF is to be compared
         name = str(configuration["name"])
         return self.write(self.run(configuration), out, name=name, report=report, pdf=pdf)
+
+
+def bundle_by_specification(
+    command: str, form: type[F], run: Callable[[F], M], write_files: WriteFiles[M]
+) -> ReportBundle[M]:
+    """Return how runs that a specification of a form makes are sealed: by it, under the command."""
+    return ReportBundle(
+        command,
+        lambda result: {command: result.spec.plain()},
+        lambda configuration: run(form.checked(configuration[command])),
+        write_files,
+    )
 
 
 def file_of(configuration: dict[str, Any], key: str = "file_path") -> Path | None:

@@ -1,11 +1,9 @@
-"""Noise of a sensor in the parameters and units of other programs' filters, and back."""
+"""Noise of a sensor in the parameters and units of other programs' filters."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError
@@ -291,30 +289,6 @@ def for_program(errors: ImuErrors, name: str, dt: float, span: float) -> dict[En
                 [entry.factor * value**entry.power * dt**entry.step for value in values]
             )
     return out
-
-
-def from_program(values: Mapping[str, Mapping[str, Triad]], name: str, dt: float) -> ImuErrors:
-    """Return the noise that parameters of a program mean: the inverse of `for_program`.
-
-    `values`: by triad and name of the parameter. A driving noise becomes a random walk.
-    """
-    name, target = target_of(name)
-    dt = PX4_STEP if name == "PX4" else dt
-    made = {"gyro": TriadErrors(), "accel": TriadErrors()}
-    for entry in target.entries:
-        if entry.name not in values.get(entry.triad, {}):
-            continue
-        given = values[entry.triad][entry.name]
-        si = triad_of([(v / entry.factor / dt**entry.step) ** (1.0 / entry.power) for v in given])
-        triads = ("gyro", "accel") if entry.name == "corrtime" else (entry.triad,)
-        for triad in triads:
-            if entry.quantity == "correlation_time":
-                made[triad] = replace(made[triad], correlation_time=si[0])
-            else:
-                quantity = "random_walk" if entry.quantity == "drive" else entry.quantity
-                changed: dict[str, Any] = {quantity: si}
-                made[triad] = replace(made[triad], **changed)
-    return ImuErrors(made["gyro"], made["accel"])
 
 
 def _without_walk(triad: TriadErrors, span: float) -> TriadErrors:

@@ -15,12 +15,12 @@ import numpy as np
 import pandas as pd
 
 from strapdown.bundle import InputFiles, Seal, check_destination, input_files, with_paths
-from strapdown.config.logs import ends_of_part
 from strapdown.config.reading import FileSpec
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.recording import ReadOptions
 from strapdown.progress import Progress, silent
 from strapdown.tables.on_disk import let_go
+from strapdown.tables.sample_clock import ends_of_part
 
 if TYPE_CHECKING:
     from strapdown.config.logs import LogTable

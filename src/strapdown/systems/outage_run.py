@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from strapdown.bundle import InputFiles, Seal, sensor_file
 from strapdown.config.alignment import sensors_of
-from strapdown.config.logs import ends_of_part
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.outage import OutageSpec, OutageStartTable
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
@@ -70,6 +69,7 @@ from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GYRO, TRAJECTORY
 from strapdown.tables.aiding import odometer_table
 from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.sample_clock import ends_of_part
 
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure

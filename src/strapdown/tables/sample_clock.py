@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from strapdown.dsp.samples import moving_mean
 from strapdown.tables.checks import Gap, find_gaps
 
-__all__ = ["SampleClock", "sample_clock"]
+__all__ = ["SampleClock", "ends_of_part", "sample_clock"]
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
@@ -423,3 +424,15 @@ def _smoother_on(fitted: Array, stamps: Array, values: Array | None, begins: Num
     blocks = np.array([block.sum() for block in np.array_split(gain, BLOCKS)])
     sd = float(blocks.std(ddof=1))
     return 0.0 if sd == 0.0 else float(blocks.mean()) / (sd / np.sqrt(BLOCKS))
+
+
+def ends_of_part(
+    first: float, from_s: float | None, to_s: float | None, duration_s: float | None
+) -> tuple[float, float]:
+    """Return begin and end of a part of a record, s, infinite where none is stated.
+
+    `first`: first stamp of the record, s, from which a length counts that has no begin.
+    """
+    if duration_s is not None:
+        to_s = (first if from_s is None else from_s) + duration_s
+    return -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s

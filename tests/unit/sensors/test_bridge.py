@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from strapdown.errors import ConfigError
-from strapdown.sensors.bridge import TARGETS, for_program, from_program, target_of
+from strapdown.sensors.bridge import PX4_STEP, TARGETS, for_program, target_of
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
+from strapdown.sensors.triad_errors import ImuErrors, TriadErrors, triad_of
 
 DEG = math.pi / 180.0
 ERRORS = ImuErrors(
@@ -33,6 +33,26 @@ def values(name, errors=ERRORS, dt=0.005):
         triad: {e.name: v for e, v in found.items() if e.triad == triad}
         for triad in ("gyro", "accel")
     }
+
+
+def from_program(values, name, dt):
+    """The noise that parameters of a program mean: a driving noise becomes a random walk."""
+    name, target = target_of(name)
+    dt = PX4_STEP if name == "PX4" else dt
+    made = {"gyro": TriadErrors(), "accel": TriadErrors()}
+    for entry in target.entries:
+        if entry.name not in values.get(entry.triad, {}):
+            continue
+        given = values[entry.triad][entry.name]
+        si = triad_of([(v / entry.factor / dt**entry.step) ** (1.0 / entry.power) for v in given])
+        triads = ("gyro", "accel") if entry.name == "corrtime" else (entry.triad,)
+        for triad in triads:
+            if entry.quantity == "correlation_time":
+                made[triad] = replace(made[triad], correlation_time=si[0])
+            else:
+                quantity = "random_walk" if entry.quantity == "drive" else entry.quantity
+                made[triad] = replace(made[triad], **{quantity: si})
+    return ImuErrors(made["gyro"], made["accel"])
 
 
 @pytest.mark.parametrize("name", TARGETS)

@@ -95,6 +95,7 @@ def test_the_noise_of_a_height_is_its_scatter_and_what_lasts(recording):
     assert tables["barometer"]["height_sd_m"] == pytest.approx(expected, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_barometer_is_proposed_and_holds_the_height(recording, tmp_path, monkeypatch):
     proposed = []
     monkeypatch.setattr(
@@ -265,7 +266,7 @@ def test_a_folder_of_a_phone_is_navigated_with_the_fixes_in_it(tmp_path):
         "Location.csv",
     ]
     fixes_of = FixesTable(path=str(folder), datum_height_m=0.0)
-    log = LogTable(path=str(folder))
+    log = LogTable(path=str(folder), duration_s=90.0)
     draft = draft_navigation(log, folder=tmp_path, axes="x,-y,-z", gnss=fixes_of)
     made = tmp_path / "navigate.toml"
     made.write_text(draft.text.replace('"?"', "0.3"), encoding="utf-8")

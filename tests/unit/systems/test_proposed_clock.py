@@ -227,6 +227,7 @@ def test_a_step_of_the_clock_is_corrected_in_what_is_proposed(tmp_path, size):
     assert written["clock_steps_s"] == [[pytest.approx(stamp), pytest.approx(by)]]
 
 
+@pytest.mark.slow
 def test_a_clock_that_may_have_stepped_in_an_outage_is_unsure_from_then_on(tmp_path):
     made, written = stepped(tmp_path, 0.15, outage=15.0)
     aid = made.table["aiding"]["gnss"]
