@@ -188,6 +188,7 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
       <p class="row"><button type="button" onClick={() => setWork({ toml: one.toml })}>Use {one.name}</button> <span class="soft">Nothing is open in it. What is proposed here is replaced.</span></p>
     </div>)}
     <Questions questions={questions} values={values} onAnswer={set} />
+    {offers.length > 0 && <Part title="Offered: add what is true">{offers.map((q) => <Ask key={q.key} question={q} onAnswer={set} />)}</Part>}
     {assumed.length > 0 && <Part title="Assumed: correct it if it is wrong">
       <div class="fields wide">{assumed.map((q) => {
         const field = fieldOf(schema, q.key!);
@@ -195,7 +196,6 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
           value={values[q.key!]} fault={faultOf(errors, q.key!)} onChange={(value) => set({ [q.key!]: value })} />;
       })}</div>
     </Part>}
-    {offers.length > 0 && <Part title="Offered: add what is true">{offers.map((q) => <Ask key={q.key} question={q} onAnswer={set} />)}</Part>}
     {proposal && (proposal.found?.length ?? 0) + proposal.findings.length > 0 && <More title="What was found while proposing it">
       <ul class="plain">{proposal.found?.map((text) => <li key={text}>{sentence(text)}</li>)}</ul>
       <Findings findings={proposal.findings} />

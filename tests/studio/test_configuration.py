@@ -680,6 +680,17 @@ def test_logs_of_one_sensor_are_read_alike(folder, two_recorders):
     ]
 
 
+def test_a_folder_with_one_recording_among_other_files_is_that_recording(folder):
+    (folder / "one").mkdir()
+    shutil.copyfile(folder / "log.csv", folder / "one" / "log.csv")
+    (folder / "one" / "LICENSE").write_text("MIT\n")
+    found = look(folder, ["one"], {}, "forward-right-down")
+    assert [s["file"] for s in found["streams"]] == ["one/log.csv"]
+    assert [f["file"] for f in found["between"]] == ["one/LICENSE"]
+    made = propose(folder, "attitude", ["one"], {}, None, {})
+    assert tomllib.loads(made["toml"])["log"]["path"] == "one/log.csv"
+
+
 def test_files_of_a_folder_have_its_name_in_what_is_found(folder):
     """Gaps and formats are listed by the name that the streams have, of two files alike, too."""
     rows = np.loadtxt(folder / "log.csv", delimiter=",", skiprows=1)

@@ -220,29 +220,33 @@ SEVERAL = ("io.folder-of-recordings", "io.gyro-in-several-logs")
 def files_of_recorders(paths: Sequence[Path]) -> list[Path]:
     """Return paths with the tables of a folder in its place, where they are of several recorders.
 
-    A folder is one recorder, whose tables are joined, unless two of them have a gyro.
+    A folder is one recorder, whose tables are joined, unless two of them have a gyro; in place of
+    one with a single recording among other files is that recording.
     """
-    return [one for path in paths for one in (_tables(path) if _of_several(path) else [path])]
-
-
-def _of_several(path: Path) -> bool:
-    """Whether it is a folder that is refused for the recordings of several sensors."""
-    return path.is_dir() and _several_in(path, _digest(path))
+    return [
+        one
+        for path in paths
+        for one in (_recordings_in(path, _digest(path)) if path.is_dir() else [path])
+    ]
 
 
 @lru_cache(maxsize=256)
-def _several_in(folder: Path, _: str) -> bool:
-    """As `_of_several`, of a folder of this digest, which is opened once and not for each look."""
+def _recordings_in(folder: Path, _: str) -> Sequence[Path]:
+    """Recordings of a folder of this digest, which is opened once and not for each look."""
     from strapdown.formats import open_stream
     from strapdown.formats.crash_records import stated_format
 
-    if stated_format(folder) is not None:
-        return False
+    # A file of a folder in a folder has no name in the studio.
+    if stated_format(folder) is not None or folder.absolute().parent != Path.cwd():
+        return [folder]
     try:
         open_stream(folder, "imu", None)
     except StrapdownError as error:
-        return error.finding.code in SEVERAL
-    return False
+        if error.finding.code in SEVERAL:
+            return _tables(folder)
+        if error.finding.code == "io.folder-of-one-recording":
+            return [Path(str(error.finding.data["path"]))]
+    return [folder]
 
 
 def _tables(folder: Path) -> list[Path]:
