@@ -5,7 +5,7 @@ import { aborted, api, problemOf } from "./api";
 import { number } from "./format";
 import { round } from "./plan";
 import type { CrashQuick, Problem } from "./types";
-import { Empty, Findings, Part, Trouble } from "./ui";
+import { Busy, Empty, Findings, Part, Trouble } from "./ui";
 
 /** `value`: as written; `origin`: as it was before it was set by hand, which the slider meets. */
 interface Slider { id: string; key: string; at: number | null; label: string; unit: string; value: number; origin: number; reach: number; step: number }
@@ -91,6 +91,7 @@ export function CrashPreview({ toml, values, was, ready, onKeep }: {
   return <Part title="What follows from it" aside={quick && quick.recorders.length > 1 ? <label class="inline">By <select value={String(unit)} onChange={(e) => setUnit(Number(e.currentTarget.value))}>
     {quick.recorders.map((name, i) => <option key={i} value={String(i)}>{name || `recorder ${i + 1}`}</option>)}</select></label> : undefined}>
     {!ready && !quick && <Empty>As soon as nothing is open: delta-V, direction of force and path, while you move what is uncertain.</Empty>}
+    {ready && !quick && !problem && <Busy>Computing delta-V, direction of force and path…</Busy>}
     <Trouble problem={problem} />
     {quick && <div class="crash">
       <div>

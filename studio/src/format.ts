@@ -11,25 +11,6 @@ export function number(value: number, digits = 4): string {
   return text.includes(".") ? text.replace(/0+$/, "").replace(/\.$/, "") : text;
 }
 
-/** Standard deviations of a two-sided bound of 95 %. */
-const TWO_SIDED_95 = 1.959963984540054;
-
-/**
- * A value and the 95 % bound of its standard deviation, both to two digits of the bound, as the
- * reports show them; `scale`: units of the value for one of the bound, where they differ.
- */
-export function bounded(value: number, sd: number, scale = 1): [string, string] {
-  const half = TWO_SIDED_95 * sd;
-  if (!(half > 0) || !Number.isFinite(half)) return [number(value, 4), ""];
-  const to = (x: number, least: number) => {
-    const places = 1 - Math.floor(Math.log10(Number(least.toPrecision(2))));
-    return places >= 0 ? x.toFixed(Math.min(places, 12)) : String(Math.round(x / 10 ** -places) * 10 ** -places);
-  };
-  const said = to(value, half * scale);
-  // Never a minus before zero.
-  return [Number(said) === 0 ? said.replace("-", "") : said, `± ${to(half, half)}`];
-}
-
 /** Any value of the server as text; a number to four digits. */
 export function shown(value: unknown): string {
   if (value === null || value === undefined) return "–";

@@ -39,7 +39,7 @@ export function ConfigurePage() {
       let toml = made.toml;
       if (work.places) toml = await withPlaces(work.kind, toml, work.places);
       const { toml: _, ...proposal } = made;
-      setWork({ toml, proposal, proposedFor: basis({ ...work, log }), name: work.name || freeName(work, state?.runs.map((r) => r.name) ?? []) });
+      setWork({ log, toml, proposal, proposedFor: basis({ ...work, log }), name: work.name || freeName(work, state?.runs.map((r) => r.name) ?? []) });
     } catch (error) {
       setProblem(problemOf(error));
     }
@@ -57,7 +57,7 @@ export function ConfigurePage() {
     <Trouble problem={kinds.problem} retry={kinds.again} />
     <Basis work={work} />
     {choose.length > 0 && <Part title={`${plural(choose.length, "question")} about the files`}>
-      {choose.map((q, i) => <Ask key={q.key} take={i === 0} question={{ ...q, text: q.file ? `${q.file}: ${q.text}` : q.text }} onAnswer={(set) => {
+      {choose.map((q, i) => <Ask key={q.key} take={i === 0} of={q.file} question={q} onAnswer={(set) => {
         const log = { ...work.log, ...set };
         setWork({ log });
         void propose(log);
@@ -67,17 +67,26 @@ export function ConfigurePage() {
       <p>How the log is read, or the part to use, was changed after this configuration was proposed.</p>
       <p class="row"><button type="button" onClick={() => void propose()}>Propose it anew</button> <span class="soft">What you wrote here is replaced.</span></p>
     </div>}
+    {work.toml && !proposing && (work.proposal?.again?.length ?? 0) > 0 && <Part title="Is this right?">
+      {work.proposal!.again!.map((q) => <Ask key={q.code} question={q} onAnswer={(set) => {
+        const log = { ...work.log };
+        for (const [key, value] of Object.entries(set)) if (value === null) delete log[key]; else log[key] = value;
+        void propose(log);
+      }} />)}
+    </Part>}
     {work.toml && !proposing && <Editor schema={kind?.schema ?? []} flags={kind?.options ?? []} />}
   </Page>;
 }
 
 /** What the configuration is made from: nothing that was chosen before is in it unseen. */
 function Basis({ work }: { work: Work }) {
-  const read = Object.entries({ ...work.log, ...(work.axes ? { axes: work.axes } : {}) });
+  const { files: own, ...common } = { ...work.log, ...(work.axes ? { axes: work.axes } : {}) } as Record<string, unknown>;
+  const of = (name: string, keys: Record<string, unknown>) => Object.entries(keys).map(([key, value]) => [`${name}${key.replaceAll("_", " ")}`, value] as const);
+  const read = [...of("", common), ...Object.entries((own ?? {}) as Record<string, Record<string, unknown>>).flatMap(([name, keys]) => of(`${name} `, keys))];
   return <dl class="facts basis">
     <dt>Files</dt><dd>{work.files.join(", ")} <a href="#/files">Change</a></dd>
     {work.trim && <><dt>Part to use</dt><dd>{stamp(work.trim[0], work.trim[1] - work.trim[0])} to {stamp(work.trim[1], work.trim[1] - work.trim[0])} s <a href="#/look">Change</a></dd></>}
-    {read.length > 0 && <><dt>Read with</dt><dd>{read.map(([key, value]) => `${key.replaceAll("_", " ")}: ${typeof value === "object" ? JSON.stringify(value) : value === "" ? "none" : String(value)}`).join("; ")} <a href="#/look">Change</a></dd></>}
+    {read.length > 0 && <><dt>Read with</dt><dd>{read.map(([key, value]) => `${key}: ${typeof value === "object" ? JSON.stringify(value) : value === "" ? "none" : String(value)}`).join("; ")} <a href="#/look">Change</a></dd></>}
     {work.places && <><dt>Places</dt><dd>of the sensor{work.places.antenna.some((v) => v !== 0) ? " and the antenna" : ""}, as drawn <a href="#/look">Change</a></dd></>}
   </dl>;
 }
@@ -166,6 +175,7 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
   const errors = checked?.errors.filter((e) => e.code !== OPEN) ?? [];
   const questions = openQuestions(checked, proposal?.questions ?? []);
   const assumed = (proposal?.to_check ?? []).filter((q) => q.key && q.key in values);
+  const offers = (proposal?.offers ?? []).filter((q) => values[q.key!] === undefined || isOpen(values[q.key!]));
   const taken = state?.runs.some((one) => one.name === work.name) ?? false;
   const reason = errors.length ? `${plural(errors.length, "error")} to correct first` : questions.length ? `${plural(questions.length, "question")} to answer first`
     : !work.name.trim() ? "the result needs a name" : taken && force !== work.name ? `there is a result named ${work.name}: tick to overwrite it, or write another name` : "";
@@ -173,7 +183,12 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
   const first = errors.length ? ".toml .findings button, .toml textarea" : questions.length ? ".ask button, .ask input" : "";
   useEffect(() => setRefused(null), [work.toml, work.name, force, questions.length, errors.length]);
   return <>
+    {proposal?.ready?.filter((one) => one.toml !== work.toml).map((one) => <div class="notice ready" key={one.name}>
+      <p><b>{one.name}</b> in the folder is a configuration for these files{one.title ? <>: {sentence(one.title)}</> : "."} {one.what}</p>
+      <p class="row"><button type="button" onClick={() => setWork({ toml: one.toml })}>Use {one.name}</button> <span class="soft">Nothing is open in it. What is proposed here is replaced.</span></p>
+    </div>)}
     <Questions questions={questions} values={values} onAnswer={set} />
+    {offers.length > 0 && <Part title="Offered: add what is true">{offers.map((q) => <Ask key={q.key} question={q} onAnswer={set} />)}</Part>}
     {assumed.length > 0 && <Part title="Assumed: correct it if it is wrong">
       <div class="fields wide">{assumed.map((q) => {
         const field = fieldOf(schema, q.key!);

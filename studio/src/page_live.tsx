@@ -5,8 +5,8 @@ import { useMemo, useState } from "preact/hooks";
 import { encode } from "uqr";
 import { api, problemOf } from "./api";
 import { Attitude, fromEuler, type Quaternion } from "./attitude";
-import { bounded, number, stamp } from "./format";
-import { METERS_PER_DEG, Plan, type Line } from "./plan";
+import { stamp } from "./format";
+import { Plan, type Line } from "./plan";
 import { newWork, putJob, useShared } from "./store";
 import { Traces, type Panel } from "./traces";
 import type { Job, Problem, Series, Span } from "./types";
@@ -171,31 +171,17 @@ function LiveState({ lines, session }: { lines: Record<string, unknown>[]; sessi
     const of = (name: string) => seen.map((line) => num(line, name));
     return { t: seen.map((line) => num(line, "time")!), columns: Object.fromEntries(columns.map((name) => [name, { unit: null, low: of(name), high: of(name) }])) };
   };
-  const rows = Object.entries(last).filter(([key, value]) => typeof value === "number" && key !== "time" && key !== "unix" && !key.endsWith("_sd"));
+  // The server writes them as the reports do.
+  const rows = (last["shown"] ?? []) as { name: string; value: string; bound: string }[];
   return <>
     <div class="motion">
       <Attitude q={attitudeOf(last)} at={`${stamp(time, 10)} s:`} />
       {track && <Plan track={track} fixes={null} cursor={cursor ?? time} onCursor={setCursor} />}
     </div>
     {panels.length > 0 && <Traces panels={panels} whole={whole} askKey={session} ask={ask} cursor={cursor} onCursor={setCursor} />}
-    {rows.length > 0 && <More title="Numbers"><Table head={["", "Value", "95 % bound"]} numeric={[1, 2]} rows={rows.map(([key, value]) => [NAMES[key] ?? key.replaceAll("_", " "), ...live(last, key, value as number)])} /></More>}
+    {rows.length > 0 && <More title="Numbers"><Table head={["", "Value", "95 % bound"]} numeric={[1, 2]} rows={rows.map((row) => [row.name, row.value, row.bound || "not stated"])} /></More>}
   </>;
 }
-
-/** Standard deviations of another name than that of the quantity. */
-const SD: Record<string, string> = { lat: "north_sd", lon: "east_sd", alt: "down_sd" };
-const NAMES: Record<string, string> = { lat: "Latitude", lon: "Longitude", alt: "Height", VN: "Velocity north", VE: "Velocity east", VD: "Velocity down", roll: "Roll", pitch: "Pitch", heading: "Heading" };
-
-/** A number of a live state with its unit, and its bound with that of its own. */
-function live(line: Record<string, unknown>, key: string, value: number): [string, string] {
-  const unit = UNITS[key] ?? "", sd = num(line, SD[key] ?? `${key}_sd`), place = key === "lat" || key === "lon";
-  // A bound of a place is along the ground.
-  const scale = !place ? 1 : 1 / (METERS_PER_DEG * (key === "lon" ? Math.max(Math.cos((num(line, "lat") ?? 0) * Math.PI / 180), 1e-6) : 1));
-  const [said, bound] = sd === null ? [number(value, place ? 8 : 4), ""] : bounded(value, sd, scale);
-  return [`${said}\u00a0${unit}`, bound ? `${bound}\u00a0${place ? "m" : unit}` : "not stated"];
-}
-
-const UNITS: Record<string, string> = { lat: "deg", lon: "deg", alt: "m", VN: "m/s", VE: "m/s", VD: "m/s", roll: "deg", pitch: "deg", heading: "deg" };
 
 function Qr({ text }: { text: string }) {
   const path = useMemo(() => {

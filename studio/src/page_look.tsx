@@ -22,15 +22,27 @@ export function useLook() {
   return useRequest(reading.files.length ? (signal) => api.look(reading, signal) : null, [JSON.stringify(reading)]);
 }
 
-/** A click's answer: keys of [log], or the axes. */
-export function answerLog(set: Record<string, unknown>, log: Record<string, unknown>) {
-  const { axes, ...rest } = set;
-  const merged: Record<string, unknown> = { ...log };
-  for (const [key, value] of Object.entries(rest)) {
-    const own = key.replace(/^log\./, "");
-    if (value === null) delete merged[own]; else merged[own] = value;
+type Keys = Record<string, unknown>;
+
+/** Keys of single files, by the name of each: their own, and the axes. */
+export const ofFiles = (log: Keys) => (log["files"] ?? {}) as Record<string, Keys>;
+
+/** A click's answer: keys of [log], or the axes; of all files, or of one alone. */
+export function answerLog(set: Keys, log: Keys, file: string | null = null) {
+  const merged: Keys = { ...log }, own: Record<string, Keys> = {};
+  for (const [name, keys] of Object.entries(ofFiles(log))) own[name] = { ...keys };
+  let axes: string | null | undefined;
+  for (const [name, value] of Object.entries(set)) {
+    const key = name.replace(/^log\./, "");
+    const target = file === null ? merged : own[file] ??= {};
+    // What is said for all is said of each.
+    if (file === null) for (const keys of Object.values(own)) delete keys[key];
+    if (file === null && key === "axes") axes = value === null ? null : String(value);
+    else if (value === null) delete target[key]; else target[key] = value;
   }
-  setWork({ log: merged, ...(axes !== undefined ? { axes: axes === null ? null : String(axes) } : {}) });
+  const left = Object.entries(own).filter(([, keys]) => Object.keys(keys).length);
+  if (left.length) merged["files"] = Object.fromEntries(left); else delete merged["files"];
+  setWork({ log: merged, ...(axes !== undefined ? { axes } : {}) });
 }
 
 export function LookPage() {
@@ -45,7 +57,7 @@ export function LookPage() {
     lead={found ? inOneSentence(found) : undefined}>
     {look.busy && <Busy>{found ? "Looking again…" : "Looking into the log: streams, clock, units, axes, rests…"}</Busy>}
     <Trouble problem={look.problem} retry={look.again} />
-    {look.problem && <ReadingForm />}
+    {look.problem && <ReadingForm files={work.files} />}
     {found && <Found look={found} reading={reading} />}
   </Page>;
 }
@@ -107,18 +119,23 @@ function Found({ look, reading }: { look: Look; reading: Reading }) {
   const { work } = useShared();
   const records = recordsOf(look);
   // That a record is no log of inertial samples is no fault of it; what is wrong with a channel is.
-  const faults = [...look.logs.flatMap((log) => log.faults.filter((f) => !records.includes(log) || f.severity !== "error").map((f) => ({ ...f, file: f.file ?? log.name }))), ...(look.between ?? [])];
-  const notes = look.logs.flatMap((log) => log.notes.map((f) => ({ ...f, file: f.file ?? log.name })));
+  const faults = [...look.logs.flatMap((log) => log.faults.filter((f) => !records.includes(log) || f.severity !== "error").map((f) => ({ ...f, file: f.file ?? log.name }))), ...look.between.filter((f) => f.severity !== "note")];
+  const notes = [...look.between.filter((f) => f.severity === "note"), ...look.logs.flatMap((log) => log.notes.map((f) => ({ ...f, file: f.file ?? log.name })))];
   const streams = look.streams.filter((s) => s.rows > 1 && s.columns.length > 0);
   const imu = streams.find((s) => s.name === "imu") ?? streams[0];
-  const ask = (q: Question) => <Ask key={q.code + q.text} question={{ ...q, text: look.logs.length > 1 && q.file ? `${q.file}: ${q.text}` : q.text, remedy: q.choices.length && !(q.free && q.key === "datum_height_m") ? null : q.remedy }} onAnswer={(set) => answerLog(set, work.log)} />;
+  const several = look.logs.length > 1;
+  const [forAll, setForAll] = useState(false);
+  const ask = (q: Question) => <Ask key={`${q.file} ${q.code} ${q.text}`} of={several ? q.file : null} question={{ ...q, remedy: q.choices.length && !(q.free && q.key === "datum_height_m") ? null : q.remedy }}
+    onAnswer={(set) => answerLog(set, work.log, several && !forAll ? q.file ?? null : null)} />;
+  const whose = several && look.questions.some((q) => q.file) && <label class="inline"><input type="checkbox" checked={forAll} onChange={(e) => setForAll(e.currentTarget.checked)} />An answer is for all files, not only for the one that it names</label>;
   const needed = look.questions.filter((q) => !q.optional), optional = look.questions.filter((q) => q.optional);
   return <>
     {needed.length > 0 && <Part title={`${plural(needed.length, "question")} about the log`}>
       <p>Nothing is guessed. One click each; you can change it later.</p>
+      {whose}
       {needed.map(ask)}
     </Part>}
-    {optional.length > 0 && <Part title="Is this right?">{optional.map(ask)}</Part>}
+    {optional.length > 0 && <Part title="Is this right?">{!needed.length && whose}{optional.map(ask)}</Part>}
     <Part title="What is in it">
       {records.length > 0 && look.streams.some(certain) && <p>{records.map((log) => log.name).join(", ")}: {records.length > 1 ? "records" : "a record"} of a crash. Choose “Crash” on the next page.</p>}
       <Contents look={look} />
@@ -132,7 +149,7 @@ function Found({ look, reading }: { look: Look; reading: Reading }) {
       <p>Units and axes, with the reason for each. Correct what is wrong: the log is looked at again.</p>
       {look.logs.filter((log) => log.read_as.length > 0).map((log) => <Table key={log.name} caption={log.name} head={["Quantity", "Column", "Unit", "Why"]}
         rows={log.read_as.map((r) => [r.quantity, r.source, r.unit ?? "–", r.why])} />)}
-      <ReadingForm />
+      <ReadingForm files={look.logs.map((log) => log.name)} />
     </Part>
     <Places look={look} reading={reading} streams={streams} />
     <div class="next"><a class="button main" href="#/choose">Choose what to find out</a></div>
@@ -343,12 +360,17 @@ function useFixes(streams: Stream[], reading: Reading): Line | null {
 
 const AXES = ["forward-right-down", "forward-left-up", "right-forward-up", "left-back-up", "back-right-up", "up-right-forward"];
 
-function ReadingForm() {
+function ReadingForm({ files }: { files: string[] }) {
   const { work } = useShared();
-  const set = (key: string) => (value: unknown) => answerLog({ [key]: value }, work.log);
+  const [of, setOf] = useState("");
+  const file = files.length > 1 && files.includes(of) ? of : null;
+  const own: Keys = file === null ? {} : ofFiles(work.log)[file] ?? {};
+  const common = (key: string) => key === "axes" ? work.axes : work.log[key];
+  const set = (key: string) => (value: unknown) => answerLog({ [key]: value }, work.log, file);
   const field = (key: string, label: string, help: string, type: "text" | "number" | "choice" | "flag" = "text", choices?: string[], unit: string | null = null) =>
-    <Control field={{ key, label, unit, type, choices: choices ?? null, help }} value={key === "axes" ? work.axes : work.log[key]} onChange={set(key)} />;
+    <Control field={{ key, label, unit, type, choices: choices ?? null, help }} value={own[key] ?? common(key)} onChange={set(key)} />;
   return <More title="Correct how it is read">
+    {files.length > 1 && <label class="inline">Of <select value={file ?? ""} onChange={(e) => setOf(e.currentTarget.value)}><option value="">all files</option>{files.map((name) => <option key={name} value={name}>{name}</option>)}</select></label>}
     <div class="fields">
       {field("axes", "Axes", "Where x, y, z of the sensor point on the vehicle", "choice", AXES)}
       {field("gyro_unit", "Unit of angular rates", "rad/s, deg/s, or of raw counts deg/s/131")}

@@ -31,6 +31,9 @@ function Result({ run }: { run: RunDetail }) {
     {run.verdict && VERDICTS[run.verdict] && <p class={`verdict ${VERDICTS[run.verdict]!.look}`}>{VERDICTS[run.verdict]!.words}</p>}
     <Against reasons={run.against ?? []} />
     <Numbers numbers={run.numbers} />
+    {(run.figures?.length ?? 0) > 0 && <div class="drawings">
+      {run.figures!.map((one) => <figure key={one.address}><a href={one.address} target="_blank" rel="noopener noreferrer" aria-label={`${one.title}, alone`}><img src={one.address} alt={one.alt} loading="lazy" /></a><figcaption>{one.title}</figcaption></figure>)}
+    </div>}
     <div class="row exports" role="group" aria-label="Take it with you">
       {exports.filter(([, , has]) => has).map(([as, words]) => <a class="button" key={as} href={api.exportOf(run.name, as)} download>{words}</a>)}
       {run.report && !run.has.pdf && <a class="button" href={run.report} target="_blank" rel="noopener noreferrer" title="It opens in a tab of its own, laid out for paper: print it there, or save it as a PDF (Ctrl+P)">Report to print or save as PDF</a>}
@@ -75,7 +78,7 @@ function Against({ reasons }: { reasons: Finding[] }) {
 
 /** What people ask for first, by the names of `strapdown compare`. */
 const MAIN = [
-  /: delta-V$/, /: direction of force/, /: clock direction$/, /^At the end: position, horizontal$/, /^At the end: heading$/, /^Errors against the truth: .*horizontal, rms$/, /^Errors against truth: quaternion, rms$/, /: way over ground$/, /: largest 95 % bound, horizontal$/, /^At the end: height$/,
+  /: delta-V$/, /: direction of force/, /: clock direction$/, /^Severity: MAIS3\+/, /^Deformation: crush$/, /^At the end: position, horizontal$/, /^At the end: heading$/, /^Errors against the truth: .*horizontal, rms$/, /^Errors against truth: quaternion, rms$/, /: way over ground$/, /: largest 95 % bound, horizontal$/, /^At the end: height$/,
   /^At the end: roll$/, /^At the end: pitch$/, /: algorithm$/, /: lowest rate$/, /: shortest time/,
 ];
 
@@ -86,7 +89,7 @@ function said({ value, bound, unit, bound_unit }: KeyNumber): string {
 }
 
 /** What a name alone leaves open. */
-const MEANS: [RegExp, string][] = [[/^delta-V$/, "change of velocity in the impact, no speed of travel"], [/direction of force/, "0 is from ahead, clockwise"]];
+const MEANS: [RegExp, string][] = [[/^delta-V$/, "change of velocity in the impact, no speed of travel"], [/direction of force/, "0 is from ahead, clockwise"], [/^MAIS3\+/, "probability of a serious injury, by this model"], [/^crush$/, "by how much the reference point came nearer to the barrier"]];
 
 /** The numbers that matter first, large; all in a table. */
 function Numbers({ numbers: all }: { numbers: KeyNumber[] }) {

@@ -59,7 +59,7 @@ export type Span = [number, number];
 export interface Fit { answer: string; reasons: Finding[] }
 
 export interface LogFound {
-  name: string; format: { name: string; title: string } | null;
+  /** From the folder of the studio. */ name: string; format: { name: string; title: string } | null;
   streams: { name: string; rows: number; rate_hz: number | null; from_s: number; to_s: number; gaps: number; lost_s: number; columns: string[]; clock?: string; clock_origin_s?: number }[];
   read_as: { source: string; quantity: string; unit: string | null; why: string }[];
   stationary: { from_s: number; to_s: number; grade: string }[];
@@ -96,6 +96,12 @@ export interface Proposal {
   others?: { toml: string; name: string }[];
   /** Questions about the files, without whose answers there is no text. */
   choose?: Question[];
+  /** Configurations in the folder that read these files. */
+  ready?: { name: string; title: string; what: string; toml: string }[];
+  /** Whether tables apply that are comments of the text. */
+  offers?: Question[];
+  /** Questions whose answers are keys of [log], for another proposal. */
+  again?: Question[];
 }
 
 export interface Fault {
@@ -133,6 +139,8 @@ export interface RunDetail extends Run {
   against?: Finding[];
   from_s?: number; to_s?: number;
   panels?: { title: string; unit: string; columns: { name: string; label: string }[] }[];
+  /** Drawings of the report of a crash. */
+  figures?: { title: string; address: string; alt: string }[];
   report: string | null; has: { track?: boolean; attitude?: boolean; series?: boolean; pdf?: boolean; toml?: boolean };
 }
 

@@ -108,7 +108,7 @@ function OneFinding({ finding: one }: { finding: Finding }) {
 export const sentence = (text: string) => text.charAt(0).toUpperCase() + text.slice(1) + (/[.?!]$/.test(text) ? "" : ".");
 
 /** An open question: answered by one click, or by a value with its unit. */
-export function Ask({ question, onAnswer, list, take }: { question: Question; onAnswer: (set: Record<string, unknown>) => void; list?: boolean; take?: boolean }) {
+export function Ask({ question, onAnswer, list, take, of }: { question: Question; onAnswer: (set: Record<string, unknown>) => void; list?: boolean; take?: boolean; /** The file that it is about, where there are several. */ of?: string | null | undefined }) {
   const own = useRef<HTMLDivElement>(null);
   useEffect(() => { if (take) own.current?.focus(); }, [take]);
   const [text, setText] = useState("");
@@ -128,7 +128,7 @@ export function Ask({ question, onAnswer, list, take }: { question: Question; on
     onAnswer({ [question.key]: value });
   };
   return <div class="ask" role="group" aria-labelledby={id} ref={own} tabIndex={-1}>
-    <p id={id}>{sentence(question.text)}</p>
+    <p id={id}>{of && <span class="of">{of}: </span>}{sentence(question.text)}</p>
     {question.remedy && <p class="help">{sentence(question.remedy)}</p>}
     {question.choices.length > 0 && <div class="row">
       {question.choices.map((choice: Choice) => <button type="button" key={choice.label} onClick={() => onAnswer(choice.set)}>{choice.label}{choice.likely ? " (likely)" : ""}</button>)}

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from tests.map_files import mbtiles, png
+from tests.studio.two_recorders import write_two_recorders
 
 ROOT = Path(__file__).parents[2]
 STUDIO = ROOT / "studio"
@@ -94,6 +95,11 @@ def test_from_files_to_a_comparison(address: str, tmp_path: Path) -> None:
 
 def test_a_crash(address: str, tmp_path: Path) -> None:
     assert "questions answered" in drive("crash.mjs", address, tmp_path)
+
+
+def test_a_newcomer_with_the_sample_and_two_recorders(address: str, tmp_path: Path) -> None:
+    files = [tmp_path / name for name in write_two_recorders(tmp_path)]
+    assert "two recorders" in drive("newcomer.mjs", address, tmp_path, *files)
 
 
 def test_a_phone_sends(address: str, tmp_path: Path) -> None:

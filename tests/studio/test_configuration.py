@@ -11,13 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.studio.two_recorders import write_two_recorders
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.studio import forms
 from strapdown.studio.configuration import check, command, edited, propose
 from strapdown.studio.forms import form_of, kinds, unit_of
 from strapdown.studio.kinds import KINDS
-from strapdown.studio.look import look
+from strapdown.studio.look import look, stream
 from strapdown.studio.questions import HEIGHTS
 
 TEXT = """\
@@ -586,12 +587,121 @@ def test_a_folder_of_two_recorders_is_its_files(folder):
     (folder / "two" / "notes.txt").write_text("It rained.\n")
     files = ["two/one.csv", "two/other.csv"]
     by_folder, by_files = (look(folder, names, {}) for names in (["two"], files))
+    left = [f["file"] for f in by_folder["between"] if f["code"] == "studio.file-not-used"]
+    assert left == ["two/notes.txt"]
+    assert not [f for f in by_files["between"] if f["code"] == "studio.file-not-used"]
     assert [s["file"] for s in by_folder["streams"]] == files
     assert by_folder["streams"] == by_files["streams"]
     made, one_by_one = (propose(folder, "crash", n, {}, None, {}) for n in (["two"], files))
     assert made["toml"] == one_by_one["toml"] and made["toml"].count("[[units]]") == 2
     unused = [f["file"] for f in made["findings"] if f["code"] == "studio.file-not-used"]
     assert unused == ["two/notes.txt"]
+
+
+@pytest.fixture
+def two_recorders(folder):
+    """Names of the logs of two recorders in the folder."""
+    return write_two_recorders(folder)
+
+
+def test_an_answer_about_one_recorder_is_of_it_alone(folder, two_recorders):
+    asked = [q for q in look(folder, two_recorders, {})["questions"] if q["key"] == "axes"]
+    assert [q["file"] for q in asked] == two_recorders
+    said = {"files": {"one.csv": {"axes": "forward-left-up"}}}
+    one = look(folder, two_recorders, said)
+    assert [q["file"] for q in one["questions"] if q["key"] == "axes"] == ["other.csv"]
+    own, other = (s["key"] for s in one["streams"])
+    assert own == look(folder, ["one.csv"], {}, "forward-left-up")["streams"][0]["key"]
+    assert other == look(folder, ["other.csv"], {})["streams"][0]["key"]
+    # What a curve is drawn of is what was looked at.
+    assert stream(folder, "one.csv", "imu", said).endswith(f"{own}/imu")
+    assert stream(folder, "other.csv", "imu", said).endswith(f"{other}/imu")
+
+
+def test_recorders_that_are_mounted_in_two_ways_have_their_angles_in_the_case(
+    folder, two_recorders
+):
+    axes = {"one.csv": "forward-left-up", "other.csv": "right-forward-up"}
+    said = {"files": {name: {"axes": text} for name, text in axes.items()}}
+    made = propose(folder, "crash", two_recorders, said, None, {})
+    units = tomllib.loads(made["toml"])["units"]
+    by_file = {one["accelerometers"][0]["path"]: one["angles_deg"] for one in units}
+    # Roll, pitch, heading of these right angles: by hand.
+    assert by_file == {"one.csv": [180.0, 0.0, 0.0], "other.csv": [180.0, 0.0, 90.0]}
+    assert not [q for q in made["questions"] if q["key"].endswith("angles_deg")]
+    # Both have the force from the front, somewhat from the left: its pulse pushes to the right.
+    assert [q["text"].endswith("came from the front") for q in made["to_check"]] == [True, True]
+    for kind in ("navigate", "attitude"):
+        alone = propose(folder, kind, ["other.csv"], said, None, {})["toml"]
+        assert tomllib.loads(alone)["axes"]["axes"] == "right-forward-up"
+
+
+def test_axes_of_a_recorder_that_gravity_contradicts_are_not_taken(folder, two_recorders):
+    said = {"files": {"one.csv": {"axes": "forward-right-down"}}}
+    made = propose(folder, "crash", ["one.csv"], said, None, {})
+    assert "crash.axes-against-gravity" in [f["code"] for f in made["findings"]]
+    assert tomllib.loads(made["toml"])["units"][0]["angles_deg"] == [180.0, 0.0, "?"]
+
+
+def test_left_handed_axes_of_a_recorder_reverse_its_third_channel(folder, two_recorders):
+    rows = np.loadtxt(folder / "one.csv", delimiter=",", skiprows=1)
+    head = (folder / "one.csv").read_text().partition("\n")[0]
+    rows[:, [3, 6]] *= -1.0
+    np.savetxt(folder / "left.csv", rows, "%.9g", ",", header=head, comments="")
+    said = {"files": {"left.csv": {"axes": "forward-left-down"}}}
+    made = propose(folder, "crash", ["left.csv"], said, None, {})
+    (unit,) = tomllib.loads(made["toml"])["units"]
+    assert unit["angles_deg"] == [180.0, 0.0, 0.0]
+    triads = (unit["accelerometers"][0], unit["gyro"])
+    assert [t["channels"]["z"] for t in triads] == ["-accel_z_m_s2", "-gyro_z_rad_s"]
+
+
+def test_what_a_case_does_not_take_of_an_answer_is_said(folder, two_recorders):
+    said = {"files": {"one.csv": {"rate_hz": 100.0}}}
+    made = propose(folder, "crash", two_recorders, said, None, {})
+    assert [f["file"] for f in made["findings"] if f["code"] == "studio.reading-not-used"] == [
+        "one.csv"
+    ]
+
+
+@pytest.mark.parametrize(
+    "files", [["one.csv"], {"one.csv": "x"}, {"one.csv": {"no_such": 1}}, {"one.csv": {"axes": 3}}]
+)
+def test_keys_of_files_that_are_none(folder, two_recorders, files):
+    with pytest.raises(ConfigError):
+        look(folder, two_recorders, {"files": files})
+
+
+def test_logs_of_one_sensor_are_read_alike(folder, two_recorders):
+    said = {"files": {"other.csv": {"axes": "right-forward-up"}}}
+    made = propose(folder, "allan", two_recorders, said, None, {})
+    assert [f["file"] for f in made["findings"] if f["code"] == "studio.read-as-the-first"] == [
+        "other.csv"
+    ]
+
+
+def test_a_folder_with_one_recording_among_other_files_is_that_recording(folder):
+    (folder / "one").mkdir()
+    shutil.copyfile(folder / "log.csv", folder / "one" / "log.csv")
+    (folder / "one" / "LICENSE").write_text("MIT\n")
+    found = look(folder, ["one"], {}, "forward-right-down")
+    assert [s["file"] for s in found["streams"]] == ["one/log.csv"]
+    assert [f["file"] for f in found["between"]] == ["one/LICENSE"]
+    made = propose(folder, "attitude", ["one"], {}, None, {})
+    assert tomllib.loads(made["toml"])["log"]["path"] == "one/log.csv"
+
+
+def test_files_of_a_folder_have_its_name_in_what_is_found(folder):
+    """Gaps and formats are listed by the name that the streams have, of two files alike, too."""
+    rows = np.loadtxt(folder / "log.csv", delimiter=",", skiprows=1)
+    head = (folder / "log.csv").read_text().partition("\n")[0]
+    with_gap = rows[(rows[:, 0] < 30.0) | (rows[:, 0] > 34.0)]
+    for name, some in (("one", with_gap), ("other", rows)):
+        (folder / name).mkdir()
+        np.savetxt(folder / name / "log.csv", some, "%.9g", ",", header=head, comments="")
+    found = look(folder, ["one/log.csv", "other/log.csv"], {}, "forward-right-down")
+    assert [one["name"] for one in found["logs"]] == [s["file"] for s in found["streams"]]
+    assert [one["streams"][0]["gaps"] for one in found["logs"]] == [1, 0]
 
 
 def test_what_is_steady_before_an_impact_may_be_a_drive(folder):
@@ -602,3 +712,62 @@ def test_what_is_steady_before_an_impact_may_be_a_drive(folder):
     found = look(folder, ["hit.csv"], {}, "forward-right-down")
     (samples,) = found["streams"]
     assert samples["rests"] == [] and samples["steady"] == found["rests"] != []
+
+
+@pytest.fixture
+def walk(folder):
+    """A log of a phone in the hand, never at rest, with a field like that of the Earth; fixes."""
+    time = np.arange(0.0, 30.0, 0.01)
+    rng = np.random.default_rng(3)
+    sway = 0.2 * np.sin(9.0 * time)
+    # Forward, right, down, with the front to the east; 24 µT to the north, 40 µT down.
+    rows = np.column_stack([time, 0 * time, sway, sway, sway, 0 * time, sway - 9.8])
+    rows[:, 1:] += 0.02 * rng.standard_normal((time.size, 6))
+    field = np.array([0.0, -24.0, 40.0]) + 0.1 * rng.standard_normal((time.size, 3))
+    head = "time_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2"
+    head += ",mag_x_uT,mag_y_uT,mag_z_uT"
+    whole = np.column_stack([rows, field])
+    np.savetxt(folder / "walk.csv", whole, "%.9g", ",", header=head, comments="")
+    stamps = np.arange(0.0, 30.0)
+    fixes = [stamps, 34.0 + 0 * stamps, -118.0 + 1e-5 * stamps, 100.0 + 0 * stamps]
+    head = "time_s,lat_deg,lon_deg,alt_m"
+    np.savetxt(folder / "fixes.csv", np.column_stack(fixes), "%.9f", ",", header=head, comments="")
+    return ["walk.csv", "fixes.csv"]
+
+
+def test_the_heading_of_a_magnetometer_is_offered_where_it_is_asked(folder, walk):
+    made = propose(folder, "navigate", walk, {}, "forward-right-down", {})
+    offers = {q["key"]: q["choices"][0]["set"] for q in made["offers"]}
+    asked = [q["key"] for q in made["questions"]]
+    assert asked == ["coarse.heading_deg", "coarse.sd_deg"]
+    start, aid = offers["coarse.heading_deg"], offers["aiding.magnetometer.kind"]
+    declination = np.degrees(np.arctan2(*aid["aiding.magnetometer.field_ned_ut"][1::-1]))
+    assert abs(start["coarse.heading_deg"] - 90.0 - declination) < 3.0 * start["coarse.sd_deg"]
+    assert start["coarse.sd_deg"] >= 5.0
+    # Clicked, it answers both questions; the table is that of the comment in the file.
+    text = edited(made["toml"], start)
+    assert not re.search(r'^\s*[a-z_]+ = "\?"', text, re.MULTILINE)
+    table = tomllib.loads(edited(made["toml"], aid))["aiding"]["magnetometer"]
+    assert table["kind"] == "magnetometer"
+    assert f"# field_ned_ut = {table['field_ned_ut']}" in made["toml"]
+
+
+def test_a_sensor_on_a_shoe_is_asked_about_where_there_are_no_fixes(folder, walk):
+    made = propose(folder, "navigate", ["log.csv"], {}, "forward-right-down", {})
+    (question,) = made["again"]
+    assert question["choices"][0]["set"] == {"foot": True}
+    again = propose(folder, "navigate", ["log.csv"], {"foot": True}, "forward-right-down", {})
+    assert "[aiding.stance]" in again["toml"] and "[aiding.stance]" not in made["toml"]
+    assert again["again"][0]["choices"][0]["set"] == {"foot": None}
+    assert not propose(folder, "navigate", walk, {}, "forward-right-down", {})["again"]
+
+
+def test_a_configuration_of_the_folder_is_offered_for_its_files(folder):
+    made = propose(folder, "allan", ["log.csv"], {}, None, {})
+    (folder / "mine.toml").write_text(made["toml"])
+    (folder / "open.toml").write_text(f'{made["toml"]}\n[axes]\naxes = "?"\n')
+    (folder / "else.toml").write_text(made["toml"].replace("log.csv", "else.csv"))
+    (folder / "none.toml").write_bytes(b"\xff\x00")
+    ready = propose(folder, "allan", ["log.csv"], {}, None, {})["ready"]
+    assert [(one["name"], one["toml"]) for one in ready] == [("mine.toml", made["toml"])]
+    assert not propose(folder, "attitude", ["log.csv"], {}, None, {})["ready"]

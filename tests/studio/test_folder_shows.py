@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 
@@ -14,7 +15,13 @@ from tests.map_files import mbtiles, pmtiles, png
 from strapdown.errors import ConfigError
 from strapdown.studio import app as studio_app
 from strapdown.studio import server
-from strapdown.studio.live_jobs import PORT, PROTOCOLS, live_command, live_info
+from strapdown.studio.live_jobs import (
+    PORT,
+    PROTOCOLS,
+    live_command,
+    live_info,
+    shown_state,
+)
 from strapdown.studio.samples import SAMPLES
 
 
@@ -31,6 +38,14 @@ def test_a_sample_is_copied_and_can_be_looked_at(fresh, name):
     proposed = fresh.ask("POST", "api/propose", {"kind": kind, "files": files})
     assert proposed.status == 200 and not proposed.json["choose"]
     assert all(f'"{file}"' in proposed.json["toml"] for file in files)
+    if name == "crash":
+        # Its case is offered, with the truth, and nothing is open in it.
+        (case,) = proposed.json["ready"]
+        assert case["name"] == "crash-case.toml" not in files
+        assert all(f'"{file}"' in case["toml"] for file in files)
+        assert re.match(r"Simulated, .* delta-V of 63\.1 km/h .* of 0\.0°\.$", case["what"])
+        checked = fresh.ask("POST", "api/check", {"kind": kind, "toml": case["toml"]}).json
+        assert not checked["errors"] and '"?"' not in case["toml"]
     (fresh.folder / files[0]).write_text("mine", encoding="utf-8")
     assert fresh.ask("POST", f"api/samples/{name}").code == "studio.name-taken"
     assert (fresh.folder / files[0]).read_text(encoding="utf-8") == "mine"
@@ -199,3 +214,32 @@ def test_the_progress_of_any_command_is_told_to_a_file(tmp_path):
     # A file that cannot be written is nobody's matter.
     environment["STRAPDOWN_PROGRESS"] = str(tmp_path / "no" / "folder")
     assert subprocess.run([*command, "--force"], env=environment, check=False).returncode == 0
+
+
+def test_numbers_of_a_live_state_are_those_of_the_reports():
+    line = {
+        "time": 12.5,
+        "unix": 1.7e9,
+        "session": "phone",
+        "lat": 37.725491,
+        "lon": -122.47213,
+        "north_sd": 0.6,
+        "east_sd": 1.0,
+        "heading": -0.004,
+        "heading_sd": 0.2,
+        "VN": -3.21987,
+        "alt": 1e400,
+        "roll": True,
+        "steps_taken": 12.0,
+        "down_sd": 2.0,
+    }
+    shown = {one["name"]: (one["value"], one["bound"]) for one in shown_state(line)}
+    gap = "\N{NO-BREAK SPACE}"
+    # Two digits of 1.96 sd; the second, 0.1 m, is 9e-7 deg of latitude.
+    assert shown == {
+        "Latitude": ("37.725491°", f"±{gap}1.2{gap}m"),
+        "Longitude": ("\N{MINUS SIGN}122.472130°", f"±{gap}2.0{gap}m"),
+        "Heading": (f"0.00{gap}deg", f"±{gap}0.39{gap}deg"),
+        "Velocity north": (f"\N{MINUS SIGN}3.220{gap}m/s", ""),
+        "steps taken": ("12.00", ""),
+    }

@@ -16,8 +16,8 @@ from urllib.parse import quote
 import numpy as np
 import pytest
 
-from strapdown.bundle import MANIFEST, sha256, write_bundle, write_json
-from strapdown.errors import Finding
+from strapdown.bundle import MANIFEST, input_files, sha256, write_bundle, write_json
+from strapdown.errors import ConfigError, Finding
 from strapdown.studio import runs
 from strapdown.studio.folder import Folder
 
@@ -335,6 +335,53 @@ def test_the_reasons_against_a_result_stand_beside_its_verdict(tmp_path):
     assert [one["code"] for one in found["against"]] == codes
     assert [one["code"] for one in found["findings"]] == codes
     assert "--" not in found["against"][1]["remedy"]
+
+
+def test_the_drawings_of_a_crash_are_those_of_its_report(tmp_path):
+    """Each with what it shows in words; one that the seal does not list is none."""
+    place = tmp_path / "a crash"
+    crush = {"recorder": "R", "depth_m": {"value": 0.5, "low": 0.4, "high": 0.6}, "at_least": True}
+    answer = {"main": "R", "deformation": {"crush": [crush]}}
+    with write_bundle(place, command="crash", configuration={}, inputs=(), seals=[]) as staging:
+        write_json(staging / "crash.json", answer)
+        (staging / "figures").mkdir()
+        for name in ("pdof", "severity", "units"):
+            text = f"<svg><title>{name}: 1 &lt; 2</title></svg>"
+            (staging / "figures" / f"{name}.svg").write_text(text, encoding="utf-8")
+    (place / "figures" / "path.svg").write_text("<svg></svg>", encoding="utf-8")
+    found = runs.run(tmp_path, place.name)
+    assert [(one["address"], one["alt"]) for one in found["figures"]] == [
+        (f"runs/a%20crash/figures/{name}.svg", f"{name}: 1 < 2") for name in ("pdof", "severity")
+    ]
+    (crush,) = [one for one in found["numbers"] if one["group"] == "Deformation"]
+    said = " ".join((crush["label"], crush["value"], crush["bound"], crush["unit"]))
+    assert said == "crush 0.50 +∞ \N{MINUS SIGN}0.10 m"
+
+
+def test_fixes_in_the_folder_of_the_log_are_drawn(tmp_path):
+    log = tmp_path / "walk"
+    log.mkdir()
+    (log / "Location.csv").write_text(
+        "time_s,lat_deg,lon_deg,alt_m\n" + "".join(f"{k},48.0,{k}e-5,0\n" for k in range(9))
+    )
+    (log / "Gyroscope.csv").write_text("time_s,gyro_x_rad_s\n0,0\n")
+    aid = {"kind": "gnss", "path": str(log)}
+    whole = {"name": "a", "navigation": {"log": {"path": str(log)}, "aiding": {"gnss": aid}}}
+    files = tuple(sorted(log.iterdir()))
+    inputs = [input_files("log", str(log), files[:1]), input_files("aid-gnss", str(log), files[1:])]
+    with write_bundle(
+        tmp_path / "a", command="navigate", configuration=whole, inputs=inputs, seals=[]
+    ):
+        pass
+    place, manifest = runs._opened(tmp_path, "a")
+    path = manifest["configuration"]["navigation"]["aiding"]["gnss"]["path"]
+    assert runs._input(place, path, manifest) == (place / path).resolve()
+    for outside in ("..", "inputs/..", "/", "inputs/log/other", "../walk"):
+        with pytest.raises(ConfigError):
+            runs._input(place, outside, manifest)
+    (place / path / "more.csv").symlink_to(tmp_path / "secret.csv")
+    with pytest.raises(ConfigError):
+        runs._input(place, path, manifest)
 
 
 def test_a_finding_that_is_not_known_is_in_the_words_of_its_result():

@@ -38,7 +38,8 @@ def doctor(
     logs : str, Path, Imu, DataFrame, (t, gyro, accel), or a list of them
         Files, folders or samples; fixes may be in a file of their own.
     axes, units
-        As of `read_imu`, for every log: how it is read.
+        As of `read_imu`, for every log: how it is read. By default a log from `read_imu` has its
+        own.
     gnss : mapping, optional
         How the fixes are read: options of `read_gnss`, as ``{"datum_height_m": 45.0}``.
     fix : str or Path, optional
@@ -73,9 +74,12 @@ def doctor(
     with memory.as_files() as folder:
         tables = [log_table(log, folder / name, stated) for name, log in named.items()]
         name = ", ".join(Path(table.path).resolve().stem for table in tables)
-        axes = axes or next((x.axes for x in given if isinstance(x, ImuFile) and x.axes), None)
+        own = tuple((x.axes if isinstance(x, ImuFile) else None) or "" for x in given)
+        stated_axes = axes or (own[0] if len(set(own)) == 1 else own) or None
         fixes = [specify(FixesTable, path=t.path, **gnss) for t in tables] if gnss else []
-        spec = specify(DoctorSpec, name=name, logs=tuple(tables), fixes=tuple(fixes), axes=axes)
+        spec = specify(
+            DoctorSpec, name=name, logs=tuple(tables), fixes=tuple(fixes), axes=stated_axes
+        )
         found = run_doctor(spec, progress)
         if fix is not None:
             write_clean_log(found, fix, force=force)

@@ -151,8 +151,21 @@ class DoctorSpec(FileSpec):
     logs: tuple[LogTable, ...] = Field(min_length=1)
     #: How the fixes in each log are read; as stated in it, if empty.
     fixes: tuple[FixesTable, ...] = ()
-    #: Orientation of the sensor's axes, as `AxesTable.axes`; of every log.
-    axes: Word | None = None
+    #: Orientation of the sensor's axes, as `AxesTable.axes`: of every log, or of each in order,
+    #: empty where it is not stated.
+    axes: Word | tuple[str, ...] | None = None
+
+    def axes_of(self, number: int) -> str | None:
+        """Return the stated axes of a log, counted from zero; None where there are none."""
+        if self.axes is None or isinstance(self.axes, str):
+            return self.axes
+        return self.axes[number] or None
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield axes of another number than the logs."""
+        if isinstance(self.axes, tuple) and len(self.axes) != len(self.logs):
+            data = {"count": len(self.axes), "logs": len(self.logs)}
+            yield Fault(("axes",), "config.axes-of-each-log", data)
 
 
 class AllanSpec(FileSpec):

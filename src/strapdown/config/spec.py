@@ -558,9 +558,11 @@ def _said(at: At, table: Mapping[str, Any], file: TomlFile | None) -> Finding:
     there, value = value_at(table, at.path)
     if not there:
         return Finding("config.not-written", key=str(path[-1]), given=shown(at.default))
-    line = None if file is None else file.line(path)
-    code = "config.written" if line is None else "config.written-in-line"
-    return Finding(code, said=_equation(path, value), at=line)
+    line, said = None if file is None else file.line(path), _equation(path, value)
+    if line is None:
+        return Finding("config.written", said=said)
+    home = place_of(path[:-1]) or "general"
+    return Finding("config.written-in-line", said=said, at=line, table=home)
 
 
 #: Number of keys of a table that a message shows.

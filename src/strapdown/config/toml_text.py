@@ -8,6 +8,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 #: Placeholder for a value that only the user knows.
 ASK = '"?"'
@@ -96,6 +97,28 @@ class Asked:
     line: int
     key: str
     what: str
+
+
+@dataclass(frozen=True)
+class Offered:
+    """A table that a file has as a comment: only the user knows whether it applies.
+
+    Attributes
+    ----------
+    table : str
+        Key path, as ``aiding.magnetometer``.
+    values : mapping
+        Its keys.
+    what : str
+        What has to be true, as a question.
+    label : str
+        The answer that adds it.
+    """
+
+    table: str
+    values: Mapping[str, Any]
+    what: str
+    label: str
 
 
 @dataclass

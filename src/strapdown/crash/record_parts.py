@@ -15,7 +15,12 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.aid_table import read_aid_table, read_reference_path
 from strapdown.formats.clocks import EPOCH
-from strapdown.formats.columns import read_name, split_brackets, without_accents
+from strapdown.formats.columns import (
+    parse_axes,
+    read_name,
+    split_brackets,
+    without_accents,
+)
 from strapdown.formats.crash_edr import KMH, rounding
 from strapdown.formats.crash_record import CrashChannel, CrashRecord, position_of
 from strapdown.formats.crash_samples import (
@@ -32,6 +37,7 @@ from strapdown.formats.inference.conclusion import (
     posterior,
 )
 from strapdown.formats.inference.rotation_rate import infer_gyro
+from strapdown.formats.triad_units import mirrored
 from strapdown.formats.vocabularies import AXIS_WORDS, CRASHES
 from strapdown.sensors.saturation import find_limits
 from strapdown.units import ACCEL_UNITS, FACTORS, GYRO_UNITS, SPEEDS, TIME_UNITS, find_unit
@@ -69,6 +75,7 @@ class Part:
     3), SI, by the likeliest units, NaN for missing axes; `label` distinguishes triads of one
     record; `zeroed`: gravity at rest has been subtracted; `named`: the record names the axes;
     `of_vehicle`: why they are the vehicle's, where the record defines them so, else empty;
+    `axes_stated`: where a person says that they point, as `parse_axes` takes it, empty without;
     `uncertainty`: error model by keys of the sensor catalogue, with its grounds `basis`;
     `velocities`: the channels of delta-V of which the accelerations are means; `vehicle` and
     `point` as of `CrashChannel`.
@@ -89,6 +96,7 @@ class Part:
     sampling: str = ""
     named: bool = False
     of_vehicle: str = ""
+    axes_stated: str = ""
     place: str = ""
     uncertainty: Mapping[str, float] = field(default_factory=dict)
     basis: str = ""
@@ -849,12 +857,36 @@ def _timed(part: Part) -> Part:
     return replace(part, clock=clock, time=part.time * (factor / was))
 
 
+class StatedReading(NamedTuple):
+    """What a person states of a record: axes, as `parse_axes` takes them, and units; or empty."""
+
+    axes: str = ""
+    accel_unit: str = ""
+    gyro_unit: str = ""
+
+    def of(self, part: Part) -> Part:
+        """Return a part with it; of left-handed axes the third channel is reversed."""
+        unit = {"acceleration": self.accel_unit, "rate": self.gyro_unit}.get(part.kind, "")
+        if unit and not part.unit:
+            part = replace(part, unit=unit, unit_why=("stated",))
+        if not self.axes:
+            return part
+        channels, values = dict(part.channels), part.values
+        if mirrored(*parse_axes(self.axes)):
+            values = values * np.array([1.0, 1.0, -1.0])
+            if third := channels.get("z"):
+                channels["z"] = third[1:] if third.startswith("-") else f"-{third}"
+        return replace(part, channels=channels, values=values, axes_stated=self.axes)
+
+
 _TABLES = {"acceleration": ACCEL_UNITS, "rate": GYRO_UNITS, "velocity": SPEEDS}
 
 
 def _stated(part: Part) -> Part | None:
     if part.unit in _TABLES.get(part.kind, {}):
-        return _scaled(part, part.kind, part.unit, "unit by the heading")
+        # The evidence for a unit that a person states is there already.
+        why = () if part.unit_why else ("unit by the heading",)
+        return _scaled(part, part.kind, part.unit, *why)
     return None
 
 
@@ -932,12 +964,12 @@ def _by_elimination(part: Part, known: Sequence[Part]) -> Part | None:
     return replace(_asked(part, "acceleration", unit), zeroed=zeroed)
 
 
-def _scaled(part: Part, kind: str, unit: str, why: str) -> Part:
+def _scaled(part: Part, kind: str, unit: str, *why: str) -> Part:
     values = part.values * _TABLES[kind][unit]
     rest = float(np.linalg.norm(quiet_part(values[:, part.axes]).mean))
     zeroed = kind == "acceleration" and rest < 0.3 * STANDARD_GRAVITY and len(part.axes) == 3
     return replace(
-        part, kind=kind, unit=unit, values=values, zeroed=zeroed, unit_why=(*part.unit_why, why)
+        part, kind=kind, unit=unit, values=values, zeroed=zeroed, unit_why=(*part.unit_why, *why)
     )
 
 

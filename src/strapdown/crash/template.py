@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path, PurePath
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,6 +41,7 @@ from strapdown.crash.record_parts import (
     KnownPath,
     Part,
     Skipped,
+    StatedReading,
     agreement,
     known_force,
     known_path,
@@ -49,9 +51,11 @@ from strapdown.crash.record_parts import (
 )
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.aid_table import read_aid_table
+from strapdown.formats.columns import parse_axes
 from strapdown.formats.crash_record import CrashRecord, compact
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.triad_units import axes_matrix, mirrored
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.pre_crash import find_pre_crash_rest
@@ -131,13 +135,20 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
     return drafts[0]
 
 
-def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> tuple[Draft, ...]:
+def draft_cases(
+    records: Sequence[CrashRecord],
+    *,
+    folder: str | Path = ".",
+    stated: Mapping[Path, StatedReading] = MappingProxyType({}),
+) -> tuple[Draft, ...]:
     """Write a proposed case for each vehicle of the records.
 
     Parameters
     ----------
     folder : str or Path
         Folder of the case files; record paths are relative to it.
+    stated : mapping of Path to StatedReading
+        How records are read, by their path, where a person says it.
 
     Returns
     -------
@@ -180,6 +191,8 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
                 # Fixes without an accelerometer do not make a recorder.
                 continue
             left = [s for s in left if drive.column not in s.names]
+        if (reading := stated.get(record.path)) is not None:
+            found = [reading.of(part) for part in found]
         own = _labels(record, found, labels)
         skipped += [replace(s, vehicle=own.get(s.vehicle, s.vehicle)) for s in left]
         parts = [replace(p, vehicle=own[p.vehicle]) for p in found]
@@ -235,9 +248,9 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
         # Fixes have no tires.
         driven = sorted(drives, key=lambda d: d.kind)[:1] if len(units) == 1 else []
         several = len(units) > 1
-        page = _filled(
-            _face(of_vehicle), left_out, title, facts, references, speeds, driven, several
-        )
+        faced = _face(of_vehicle)
+        against = [u.against_gravity() for u in faced if u.axes_contradicted]
+        page = _filled(faced, left_out, title, facts, references, speeds, driven, several)
         drafts.append(
             Draft(
                 page.text,
@@ -245,7 +258,7 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
                 tuple(page.asked),
                 tuple(page.to_check),
                 left_out,
-                tuple(findings),
+                (*findings, *against),
                 vehicle,
                 plain(name),
             )
@@ -574,6 +587,27 @@ class Unit:
     def axes(self) -> set[str]:
         """Axes that an accelerometer measures."""
         return {a for p in self.accelerometers for a in p.channels}
+
+    @property
+    def axes_stated(self) -> str:
+        """Where a person says that its axes point; empty without, or if its files differ in it."""
+        parts = [*self.accelerometers, *([self.gyro] if self.gyro else [])]
+        said = {p.axes_stated for p in parts}
+        return said.pop() if len(said) == 1 else ""
+
+    @property
+    def axes_contradicted(self) -> bool:
+        """Whether gravity at rest contradicts the stated axes by over half a right angle."""
+        sitting = self.impact.sitting
+        if not self.axes_stated or sitting is None or not sitting.length:
+            return False
+        up = float(sitting.into_vehicle(stated_mounting(self.axes_stated)[2:])[0, 2])
+        return up < math.cos(math.radians(MOST_PITCH))
+
+    def against_gravity(self) -> Finding:
+        """Return the finding that gravity at rest contradicts the stated axes."""
+        data = {"axes": self.axes_stated, "unit": self.name}
+        return Finding("crash.axes-against-gravity", severity="warning", data=data)
 
     @property
     def place(self) -> str:
@@ -1017,7 +1051,8 @@ class Sitting(NamedTuple):
     """Mounting angles from gravity at rest, as `Mounting.angles_deg` without the heading.
 
     `along` is the sensor axis that points up, as ``-z`` (empty where none does), `lean_deg` its
-    angle to the vertical, `length` that of the specific force, m/s².
+    angle to the vertical, `length` that of the specific force, m/s²; zero where the angles are
+    stated, and not from gravity.
     """
 
     roll_deg: float
@@ -1104,7 +1139,7 @@ def _turning(unit: Unit, part: Part) -> dict[str, Any] | None:
 
 def _face(units: Sequence[Unit]) -> list[Unit]:
     """Find the heading of each unit's mounting, of the four right angles."""
-    out = [_own_heading(unit) for unit in units]
+    out = [_as_stated(_own_heading(unit)) for unit in units]
     first = next((u for u in out if u.heading_deg is not None), None)
     if first is None or first.heading_deg is None:
         return [_like(unit, None, "") for unit in out]
@@ -1137,6 +1172,39 @@ def _own_heading(unit: Unit) -> Unit:
     if not all(grounds) or not (sitting is None or sitting.along.endswith("z")):
         return unit
     return replace(unit, heading_deg=0.0, heading_why=f"found: {grounds[0]}")
+
+
+def stated_mounting(text: str) -> Array:
+    """Return ``C_vs``, (3, 3), of stated axes; of left-handed ones the third channel is reversed.
+
+    `text`: as `parse_axes`.
+    """
+    axis, sign = parse_axes(text)
+    C_vs = axes_matrix(axis, sign)
+    return np.asarray(C_vs * np.array([1.0, 1.0, -1.0 if mirrored(axis, sign) else 1.0]))
+
+
+def _as_stated(unit: Unit) -> Unit:
+    """Mounting by the axes that a person states: the heading, and roll and pitch without gravity.
+
+    With roll and pitch ``C`` by gravity, the heading is that of the rotation ``R_z(h) C`` nearest
+    to the stated ``M``, for which ``trace(Mᵀ R_z(h) C)`` is largest. Axes that gravity contradicts
+    are not used.
+    """
+    text, sitting = unit.axes_stated, unit.impact.sitting
+    if not text:
+        return unit
+    if unit.axes_contradicted:
+        return replace(unit, heading_deg=None, heading_why="")
+    why, stated = f"stated: {text}", stated_mounting(text)
+    if sitting is None:
+        roll, pitch, heading = within_half_turn(rotation.euler_from_dcm(stated)) + 0.0
+        impact = unit.impact._replace(sitting=Sitting(roll, pitch, "", 0.0, 0.0))
+        return replace(unit, heading_deg=float(heading), heading_why=why, impact=impact)
+    level = rotation.dcm_from_euler((sitting.roll_deg, sitting.pitch_deg, 0.0))
+    turn = level @ stated.T
+    heading = math.degrees(math.atan2(turn[0, 1] - turn[1, 0], turn[0, 0] + turn[1, 1]))
+    return replace(unit, heading_deg=round(heading, 1) + 0.0, heading_why=why)
 
 
 def _like(unit: Unit, goal: float | None, name: str) -> Unit:

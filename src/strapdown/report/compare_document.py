@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from strapdown import __version__
 from strapdown.config.toml_file import shown
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.ellipsoids import WGS84
 from strapdown.report.compare_charts import charts, in_units, quantity_words
 from strapdown.report.compare_numbers import Value
 from strapdown.report.compare_tracks import QUANTITIES
@@ -35,6 +34,7 @@ from strapdown.report.values import (
     half_words,
     instant,
     length_words,
+    on_ground,
     plain,
     share_words,
     shown_unit,
@@ -47,10 +47,6 @@ if TYPE_CHECKING:
 SAME, NONE = "same", "–"
 #: Distance of two positions that is rounding alone, m.
 SAME_PLACE = 1e-9
-#: Decimals of a latitude or longitude, deg: a centimeter.
-PLACES = 7
-#: Of a great circle.
-METRES_PER_DEG = math.radians(WGS84.semi_major_axis)
 #: What a computation in double precision leaves of zero, in any unit that is shown.
 ROUNDING = 1e-9
 METHOD = (
@@ -441,10 +437,7 @@ def shown_value(value: Value, factor: float, places: int) -> tuple[str, str]:
     if value.value is None:
         return "", "" if below is None else f"±{GAP}{half_words(factor * below)}"
     if value.kind in ("lat", "lon"):
-        if below is None:
-            return f"{plain(value.value, PLACES)}°", ""
-        finest = decimals(below / METRES_PER_DEG, 2, least=2, most=PLACES + 2)
-        return f"{plain(value.value, finest)}°", f"±{GAP}{half_words(below)}"
+        return on_ground(value.value, below)
     shown = factor * value.value
     if below is not None and above is not None and not math.isinf(min(below, above)):
         return bounded(shown, factor * below, factor * above)

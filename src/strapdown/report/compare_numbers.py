@@ -480,6 +480,7 @@ def _crash(part: RunPart) -> Iterator[Value]:
             "m/s" if unit == "mph" else unit,
             **more,
         )
+    yield from _deformation(_table(data, "deformation"), main)
     closure = _table(data, "closure")
     for key, label, unit in CLOSURE:
         value = _number(closure, key, "value")
@@ -489,6 +490,23 @@ def _crash(part: RunPart) -> Iterator[Value]:
     for one in _tables(data, "references"):
         name, consistent = _word(one, "reference") or "?", _word(one, "consistent")
         yield from _row(f"references.{name}", "References", f"{name}: consistent", consistent)
+
+
+def _deformation(found: Mapping[str, Any], main: str | None) -> Iterator[Value]:
+    """Crush by each recorder, and what a stated residual crush gives."""
+    group = "Deformation"
+    for one in _tables(found, "crush"):
+        label, key = _of_main({"of": _word(one, "recorder")}, "crush", "deformation.crush_m", main)
+        more = _within(one, "depth_m")
+        if _at(one, "at_least") is True:
+            more["above"] = math.inf
+        yield from _row(key, group, label, _number(one, "depth_m", "value"), "m", **more)
+    for name, label, unit in (
+        ("energy_of_residual_crush_j", "energy from residual crush", "J"),
+        ("energy_equivalent_speed_m_per_s", "energy-equivalent speed", "m/s"),
+    ):
+        value = _number(found, name, "value")
+        yield from _row(f"deformation.{name}", group, label, value, unit, **_within(found, name))
 
 
 def _of_main(one: Mapping[str, Any], label: str, key: str, main: str | None) -> tuple[str, str]:

@@ -9,6 +9,7 @@ from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
 from strapdown.constants import DEG_PER_HOUR, MICRO_G, STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.ellipsoids import WGS84
 from strapdown.units import FORCES, LENGTHS, MASSES, MOMENTS, SHOWN_UNITS, SPEEDS, ShownUnits
 
 if TYPE_CHECKING:
@@ -43,6 +44,9 @@ GAP = "\u00a0"
 DIGITS = 2
 # Decimals of a value at most.
 MOST = 6
+# Decimals of a latitude or longitude, deg: a centimeter; and its length along a meridian.
+PLACES = 7
+METERS_PER_DEG = math.radians(WGS84.semi_major_axis)
 #: Instead of the bound of a quantity of which the error model has no state.
 NOT_ESTIMATED = "not estimated"
 
@@ -117,6 +121,26 @@ def bounded(value: float, below: float, above: float | None = None) -> tuple[str
         return said, f"±{GAP}{half_words(below)}"
     up, down = ("∞" if math.isinf(half) else half_words(half) for half in (above, below))
     return said, f"+{up} {MINUS}{down}"
+
+
+def on_ground(deg: float, half: float | None) -> tuple[str, str]:
+    """Format a latitude or longitude, deg, to two digits of its bound, which is in m.
+
+    Parameters
+    ----------
+    deg : float
+    half : float or None, m
+        Half width of the bound along the ground; without one to a centimeter.
+
+    Returns
+    -------
+    tuple of str
+        ``("37.725491°", "± 1.2")``; the bound is empty without one.
+    """
+    if half is None:
+        return f"{plain(deg, PLACES)}°", ""
+    finest = decimals(half / METERS_PER_DEG, DIGITS, least=2, most=PLACES + 2)
+    return f"{plain(deg, finest)}°", f"±{GAP}{half_words(half)}"
 
 
 def half_words(half: float) -> str:

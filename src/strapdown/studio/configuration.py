@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,14 +28,16 @@ from strapdown.config.toml_file import (
     place_of,
 )
 from strapdown.config.toml_text import Asked
-from strapdown.errors import ConfigError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.studio.folder import Folder
 from strapdown.studio.kinds import KINDS, Kind
-from strapdown.studio.questions import open_question
+from strapdown.studio.questions import offered_question, open_question
 from strapdown.studio.reading_process import told
 
 __all__ = ["check", "checked", "command", "edited", "propose"]
 
+#: Configurations of the folder that are offered at most.
+MOST_READY = 5
 #: Longest text of a configuration, characters; keys that are changed at once.
 LONGEST, MOST = 1 << 20, 200
 
@@ -67,7 +70,10 @@ def propose(
     -------
     dict
         ``toml``, ``questions``, ``findings``; ``found``: what it rests on; ``others``: of further
-        vehicles. ``choose``: questions about the files, without whose answers ``toml`` is empty.
+        vehicles. ``choose``: questions about the files, without whose answers ``toml`` is empty;
+        ``ready``: configurations in the folder that read these files and have no fault, the latest
+        first: ``name``, ``title``, ``what``, ``toml``; ``offers``: whether tables apply that are
+        comments; ``again``: questions whose answers are keys of ``[log]`` for another proposal.
     """
     one = _kind(kind)
     place = Folder(folder)
@@ -77,19 +83,47 @@ def propose(
     drafts = one.draft([path.relative_to(place.path) for path in paths], dict(log), axes)
     first, *others = drafts
     text = edited(first.text, answers)
-    asked = [a for a in first.asked if not _set(a, answers)]
     return {
         "toml": text,
-        "questions": _questions(text, asked),
+        "questions": [q for q in _questions(text, first.asked) if q["key"] not in answers],
         "to_check": _questions(text, first.to_check),
         "findings": [told(finding) for finding in first.findings],
         "found": list(first.found),
         "choose": list(first.choose),
+        "ready": list(_ready(place, one, names)),
+        "offers": [offered_question(one) for one in first.offers],
+        "again": list(first.again),
         "others": [
             {"toml": other.text, "name": str(other.name or k)}
             for k, other in enumerate(others, start=2)
         ],
     }
+
+
+def _ready(place: Folder, kind: Kind, names: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Yield the configurations of the folder for such a run over these files."""
+    written = [path for one in place.entries() if (path := Path(one.path)).suffix == ".toml"]
+    count = 0
+    for path in sorted(written, key=lambda one: one.stat().st_mtime, reverse=True)[:MOST]:
+        with suppress(ConfigError, DataError, OSError, UnicodeDecodeError):
+            if path.stat().st_size > LONGEST:
+                continue
+            text = path.read_text(encoding="utf-8")
+            table = parse_toml(path, text).table
+            read = [Path(name) for name in named_paths(table)]
+            if not any(one.is_relative_to(name) for one in read for name in names):
+                continue
+            spec = checked(place.path, kind, text, path.stem)
+            said = {key: str(getattr(spec, key, "") or "") for key in ("title", "description")}
+            yield {
+                "name": path.name,
+                "title": said["title"],
+                "what": said["description"],
+                "toml": text,
+            }
+            count += 1
+        if count == MOST_READY:
+            return
 
 
 def check(
@@ -429,7 +463,3 @@ def unit_of_key(key: str) -> str:
     from strapdown.studio.forms import unit_of
 
     return unit_of(key)
-
-
-def _set(asked: Asked, answers: Mapping[str, Any]) -> bool:
-    return any(str(key).rpartition(".")[2] == asked.key for key in answers)

@@ -13,6 +13,7 @@ from starlette.websockets import WebSocket
 
 from strapdown.studio.folder import Folder
 from strapdown.studio.jobs import ENDED, Jobs
+from strapdown.studio.live_jobs import shown_state
 
 __all__ = ["Events"]
 
@@ -128,7 +129,12 @@ class Events:
             if len(line) <= LINE and line[:1] == b"{":
                 with suppress(ValueError):
                     found.append({"line": {"id": number, "data": json.loads(line)}})
-        return found[-WAITING // 4 :]
+        found = found[-WAITING // 4 :]
+        # The page writes the numbers of the last state of each session.
+        last = {str(one["line"]["data"].get("session")): one["line"]["data"] for one in found}
+        for state in last.values():
+            state["shown"] = shown_state(state)
+        return found
 
 
 async def _until_closed(socket: WebSocket) -> None:

@@ -31,10 +31,20 @@ from strapdown.config.spec import (
     accepted_by,
     specify,
 )
-from strapdown.config.toml_text import Asked, Page, inline, string
+from strapdown.config.toml_text import Asked, Offered, Page, inline, string
 from strapdown.errors import DataError, Finding
+from strapdown.formats.crash_record import CrashRecord
 from strapdown.sensors.bridge import target_of
-from strapdown.studio.questions import HEIGHTS, ROLES, either_question, of_each, role_question
+from strapdown.studio.questions import (
+    FOOT,
+    HEIGHTS,
+    ROLES,
+    either_question,
+    foot_question,
+    of_each,
+    of_file,
+    role_question,
+)
 
 __all__ = ["KINDS", "Draft", "Kind"]
 
@@ -43,7 +53,8 @@ __all__ = ["KINDS", "Draft", "Kind"]
 class Draft:
     """A proposed configuration: its text, what it rests on, and what is open.
 
-    `choose`: questions about the files, without whose answers there is no text.
+    `choose`: questions about the files, without whose answers there is no text. `offers`: tables
+    that a person may add; `again`: questions whose answers are proposed anew.
     """
 
     text: str
@@ -53,6 +64,8 @@ class Draft:
     findings: tuple[Finding, ...] = ()
     name: str = ""
     choose: tuple[dict[str, Any], ...] = ()
+    offers: tuple[Offered, ...] = ()
+    again: tuple[dict[str, Any], ...] = ()
 
 
 Paths = Sequence[Path]
@@ -90,7 +103,13 @@ class Kind:
 
 
 def _log_table(path: Path, keys: Keys) -> LogTable:
-    return specify(LogTable, path=str(path), **of_each(keys)[0])
+    own, _ = of_file(keys, None, path.as_posix())
+    return specify(LogTable, path=str(path), **of_each(own)[0])
+
+
+def _axes_of(path: Path, keys: Keys, axes: str | None) -> str | None:
+    """Axes of a log, as stated of it alone or of all."""
+    return of_file(keys, axes, path.as_posix())[1]
 
 
 @dataclass(frozen=True)
@@ -212,14 +231,19 @@ def _draft_navigation(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]
     roles = _roles("navigate", paths, keys, axes)
     if roles.asked:
         return [Draft("", choose=roles.asked)]
-    log, of_fixes = roles.samples, of_each(keys)[1]
+    log = roles.samples
     fixes = None if roles.fixes == log else roles.fixes
+    of_fixes = of_each(of_file(keys, None, (fixes or log).as_posix())[0])[1]
+    axes = _axes_of(log, keys, axes)
     known = fixes is not None or of_fixes
     gnss = specify(FixesTable, path=str(fixes or log), **of_fixes) if known else None
     truth = roles.reference
     table = _log_table(log, keys)
-    made = draft_navigation(table, folder=Path(), axes=axes, gnss=gnss, truth=truth)
-    return [_drafted(made, roles)]
+    foot = bool(keys.get(FOOT))
+    made = draft_navigation(table, folder=Path(), axes=axes, gnss=gnss, truth=truth, foot=foot)
+    # Whoever walks with a receiver is followed by its fixes.
+    ask = foot or roles.fixes is None
+    return [replace(_drafted(made, roles), again=(foot_question(foot),) if ask else ())]
 
 
 def _draft_alignment(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
@@ -228,9 +252,9 @@ def _draft_alignment(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
     roles = _roles("align", paths, keys, axes)
     if roles.asked:
         return [Draft("", choose=roles.asked)]
-    return [
-        _drafted(draft_alignment(_log_table(roles.samples, keys), folder=Path(), axes=axes), roles)
-    ]
+    log = roles.samples
+    made = draft_alignment(_log_table(log, keys), folder=Path(), axes=_axes_of(log, keys, axes))
+    return [_drafted(made, roles)]
 
 
 def _drafted(made: Any, roles: Roles) -> Draft:
@@ -240,42 +264,45 @@ def _drafted(made: Any, roles: Roles) -> Draft:
 
 
 def _draft_crash(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
+    from strapdown.crash.record_parts import StatedReading
     from strapdown.crash.template import draft_cases
     from strapdown.formats.crash_records import read_crash_record
-    from strapdown.studio.look import files_of_recorders
+    from strapdown.studio.look import files_of_recorders, unused_files
 
-    records, seen = [], set()
+    records: list[CrashRecord] = []
+    seen: set[Path] = set()
     for path in files_of_recorders(paths):
         # A record of several files is one, whichever of them are chosen.
         if path.resolve() not in seen:
             records.append(read_crash_record(path))
             seen |= {file.resolve() for file in (*records[-1].files, path)}
-    unused = [
-        Finding("studio.file-not-used", severity="note", file=file.as_posix())
-        for path in paths
-        for file in _inside(path)
-        if file.resolve() not in seen
-    ][:MOST_UNUSED]
+    unused = unused_files(paths, seen)
+    stated, beside = {}, []
+    for record in records:
+        own, own_axes = of_file(keys, axes, record.path.as_posix())
+        taken = {k: str(own[k]) for k in ("accel_unit", "gyro_unit") if k in own}
+        stated[record.path] = StatedReading(axes=own_axes or "", **taken)
+        if left := [k for k in of_each(own)[0] if k not in taken and k not in PART]:
+            name = record.path.as_posix()
+            beside.append(
+                Finding(
+                    "studio.reading-not-used", severity="warning", file=name, data={"keys": left}
+                )
+            )
     begin, end = keys.get("from_s"), keys.get("to_s")
     part: tuple[Finding, ...] = ()
     if begin is not None or end is not None:
         data = {"begin": begin or 0.0, "end": math.inf if end is None else end}
         part = (Finding("studio.part-not-used", data=data),)
-    more = (*unused, *part)
+    more = (*beside, *unused, *part)
     return [
         Draft(one.text, one.found, one.asked, one.to_check, (*one.findings, *more), one.vehicle)
-        for one in draft_cases(records, folder=Path())
+        for one in draft_cases(records, folder=Path(), stated=stated)
     ]
 
 
-def _inside(path: Path) -> list[Path]:
-    """List the files of a folder by name, without hidden ones; none of a file."""
-    found = path.iterdir() if path.is_dir() else ()
-    return sorted(file for file in found if file.is_file() and not file.name.startswith("."))
-
-
-#: Files of a folder that are listed as not used, at most.
-MOST_UNUSED = 20
+#: Keys of the part of a log to use.
+PART = ("from_s", "to_s", "duration_s")
 
 
 def _by_file(command: str) -> Callable[[Any, str], tuple[list[str], str]]:
@@ -405,6 +432,7 @@ def _draft_of_options(table: str, what: str, example: Iterable[tuple[str, str, s
             return [Draft("", choose=roles.asked)]
         unused = {f.file for f in roles.findings}
         first = roles.samples
+        stated_axes, axes = axes, _axes_of(first, keys, axes)
         others = [one for one in paths if one != first and one.as_posix() not in unused]
         spec = _log_table(first, keys)
         page = Page()
@@ -425,6 +453,18 @@ def _draft_of_options(table: str, what: str, example: Iterable[tuple[str, str, s
         page.table(f"[{table}]")
         for key, value, remark in example:
             page.key(key, value, remark)
+        alike = of_file(keys, axes, first.as_posix())
+        apart = [] if table == "attitude" else others
+        findings = [
+            Finding(
+                "studio.read-as-the-first",
+                severity="warning",
+                file=one.as_posix(),
+                data={"first": first.as_posix()},
+            )
+            for one in apart
+            if of_file(keys, stated_axes, one.as_posix()) != alike
+        ]
         found = []
         if roles.reference is not None and not roles.within:
             listed = string(roles.reference.as_posix())
@@ -432,7 +472,7 @@ def _draft_of_options(table: str, what: str, example: Iterable[tuple[str, str, s
             found.append(
                 f"{roles.reference.as_posix()}: a reference, to compare the attitudes with"
             )
-        return [Draft(page.text, tuple(found), findings=roles.findings)]
+        return [Draft(page.text, tuple(found), findings=(*roles.findings, *findings))]
 
     return draft
 

@@ -11,11 +11,13 @@ from typing import Any
 
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.toml_file import read_toml
+from strapdown.constants import TWO_SIDED_95
 from strapdown.errors import ConfigError, Finding, StrapdownError, check_choice, printable
+from strapdown.report.values import GAP, bounded, on_ground
 from strapdown.studio.configuration import LONGEST, refuse_outside
 from strapdown.studio.folder import Folder
 
-__all__ = ["PROTOCOLS", "live_command", "live_info"]
+__all__ = ["PROTOCOLS", "live_command", "live_info", "shown_state"]
 
 
 @dataclass(frozen=True)
@@ -152,6 +154,57 @@ def _navigations(folder: Folder) -> Iterator[str]:
         with suppress(StrapdownError, OSError, ValueError):
             if (folder.path / name).stat().st_size <= LONGEST:
                 yield _configuration(folder, name)
+
+
+#: Quantities of a state line, as they are shown: name, unit, and the key of the standard deviation.
+SHOWN = {
+    "lat": ("Latitude", "m", "north_sd"),
+    "lon": ("Longitude", "m", "east_sd"),
+    "alt": ("Height", "m", "down_sd"),
+    "VN": ("Velocity north", "m/s", "VN_sd"),
+    "VE": ("Velocity east", "m/s", "VE_sd"),
+    "VD": ("Velocity down", "m/s", "VD_sd"),
+    "roll": ("Roll", "deg", "roll_sd"),
+    "pitch": ("Pitch", "deg", "pitch_sd"),
+    "heading": ("Heading", "deg", "heading_sd"),
+}
+#: Keys of a state line that are no quantities of the state.
+STAMPS = ("time", "unix")
+
+
+def shown_state(line: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Return the numbers of a state line as the reports show them: name, value, 95 % bound.
+
+    The bound is empty where the line has no standard deviation.
+    """
+    found = []
+    for key in line:
+        value = _finite(line, key)
+        if value is None or key in STAMPS or key.endswith("_sd"):
+            continue
+        name, unit, of_sd = SHOWN.get(key, (key.replace("_", " "), "", f"{key}_sd"))
+        sd = _finite(line, of_sd)
+        half = None if sd is None or sd <= 0.0 else TWO_SIDED_95 * sd
+        if key in ("lat", "lon"):
+            said, bound = on_ground(value, half)
+        else:
+            said, bound = bounded(value, math.inf if half is None else half)
+            said = f"{said}{GAP}{unit}" if unit else said
+        bound = f"{bound}{GAP}{unit}" if bound and unit else bound
+        found.append({"name": name, "value": said, "bound": bound})
+    return found
+
+
+def _finite(line: Mapping[str, Any], key: str) -> float | None:
+    """Return a number of a line; None: there is none. A line is data of another machine."""
+    value = line.get(key)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    return float(value) if abs(value) < BEYOND else None
+
+
+#: Numbers that no state has.
+BEYOND = 1e30
 
 
 def live_command(folder: Path, name: str, protocol: str, options: Mapping[str, Any]) -> list[str]:

@@ -23,16 +23,21 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.bundle import sha256, source_digest
+from strapdown.config.logs import DoctorSpec, FixesTable, LogTable
+from strapdown.config.spec import specify
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.studio.folder import Folder, plain_name
 from strapdown.studio.pyramid import LIST, write_stream
 from strapdown.studio.questions import (
+    FOOT,
     HEIGHTS,
+    OF_FILES,
     ROLES,
     axes_question,
     heights_question,
     of_each,
+    of_file,
     question_of,
 )
 from strapdown.studio.reading_process import told
@@ -83,8 +88,9 @@ def look(
     names : sequence of str
         Of files in it.
     log : mapping
-        Keys of a table ``[log]``, for each.
+        Keys of a table ``[log]``, for each; under `OF_FILES` those of single files.
     axes : str, optional
+        Of each, where none are stated of a file alone.
 
     Returns
     -------
@@ -93,11 +99,12 @@ def look(
         stretches and ``gaps`` of the samples of its file; ``rests``, steady ones too, and ``gaps``
         of the first log.
     """
-    from strapdown.api.doctor import doctor
     from strapdown.report.doctor import diagnosis_json, headline, uses
+    from strapdown.systems.doctor import run_doctor
 
     place = Folder(folder)
-    paths = files_of_recorders([place.file(name) for name in names])
+    chosen = [place.file(name) for name in names]
+    paths = files_of_recorders(chosen)
     if not paths:
         raise ConfigError("studio.nothing-named")
     keys = _reading(log)
@@ -107,12 +114,11 @@ def look(
         found: dict[str, Any] = json.loads((kept / "look.json").read_text(encoding="utf-8"))
         if all((_cache(place) / s["key"] / s["name"] / LIST).is_file() for s in found["streams"]):
             os.utime(kept)
-            return found
+            return _with_unused(found, chosen)
     # Names, not paths: nothing that is shown tells where the folder is, in which this process is.
     by_name = {place.name_of(path): path for path in paths}
-    of_log, of_fixes = of_each(keys)
     try:
-        made = doctor(list(by_name), axes=axes, gnss=of_fixes or None, **of_log)
+        made = run_doctor(_examined(list(by_name), keys, axes))
     except DataError as error:
         # Fixes alone, of which only the level of their heights is open: that is asked, too.
         asked = _heights_of([error.finding], by_name)
@@ -123,7 +129,7 @@ def look(
     own_stretches = [_stretches(one) for one in made.logs]
     for one, stretches in zip(made.logs, own_stretches, strict=True):
         path = by_name[Path(one.log.path).as_posix()]
-        own = _key([path], keys, axes)
+        own = _key([path], *of_file(keys, axes, place.name_of(path)))
         lent = one.data["fixes_from"]
         tables = {n: t for n, t in one.streams.items() if not (n == "gnss" and lent)}
         rates = {str(s["name"]): s["rate_hz"] for s in one.data["streams"]}
@@ -142,13 +148,20 @@ def look(
                 about = {"file": place.name_of(path), "key": own, "name": name, **about}
                 streams.append({**about, **stretches, **listed})
     first = next((k for k, one in enumerate(made.logs) if "imu" in one.streams), 0)
+    said = diagnosis_json(made, "studio")
+    # Names from the folder of the studio, as in streams and questions: two files may be alike.
+    said["logs"] = [
+        {**log, "name": Path(one.log.path).as_posix()}
+        for log, one in zip(said["logs"], made.logs, strict=True)
+    ]
     found = {
-        **diagnosis_json(made, "studio"),
+        **said,
+        "read": sorted({str(file) for path in paths for file in _files_read(path)}),
         "said": [headline(one) for one in made.logs],
         "uses": [{use: one.answer(use) for use in uses(one)} for one in made.logs],
         "findings": [told(f) for one in made.logs for f in (*one.faults, *one.notes)],
         "questions": [
-            *_questions(made.logs, keys.get("columns", {})),
+            *_questions(made.logs, keys),
             *_heights_of(made.between, by_name),
         ],
         "streams": streams,
@@ -158,7 +171,46 @@ def look(
     }
     _written(kept, found)
     _forget(_cache(place))
-    return found
+    return _with_unused(found, chosen)
+
+
+#: Files of a folder that are listed as not used, at most.
+MOST_UNUSED = 20
+
+
+def unused_files(paths: Sequence[Path], used: set[Path]) -> list[Finding]:
+    """Return findings for the files of folders that are not among those used, by resolved path."""
+    inside = [f for path in paths if path.is_dir() for f in sorted(path.iterdir()) if f.is_file()]
+    left = [f for f in inside if not f.name.startswith(".") and f.resolve() not in used]
+    here = Path.cwd()
+    return [
+        Finding(
+            "studio.file-not-used",
+            severity="note",
+            file=(f.relative_to(here) if f.is_absolute() else f).as_posix(),
+        )
+        for f in left[:MOST_UNUSED]
+    ]
+
+
+def _with_unused(found: Mapping[str, Any], chosen: Sequence[Path]) -> dict[str, Any]:
+    """Return what was found, with the files of chosen folders that were not read."""
+    shown = {key: value for key, value in found.items() if key != "read"}
+    unused = unused_files(chosen, set(map(Path, found["read"])))
+    return {**shown, "between": [*shown["between"], *map(told, unused)]}
+
+
+def _files_read(path: Path) -> list[Path]:
+    """List the files that are read for a path, resolved; of a crash with those it names."""
+    from strapdown.formats import files_of
+    from strapdown.formats.crash_records import read_crash_record, stated_format
+
+    own: Sequence[Path] = [path]
+    if path.is_dir():
+        with suppress(StrapdownError):
+            of_crash = stated_format(path) is not None
+            own = read_crash_record(path).files if of_crash else files_of(path)
+    return [path.resolve(), *(file.resolve() for file in own)]
 
 
 #: Why a folder is no recording: it has those of several sensors.
@@ -168,29 +220,33 @@ SEVERAL = ("io.folder-of-recordings", "io.gyro-in-several-logs")
 def files_of_recorders(paths: Sequence[Path]) -> list[Path]:
     """Return paths with the tables of a folder in its place, where they are of several recorders.
 
-    A folder is one recorder, whose tables are joined, unless two of them have a gyro.
+    A folder is one recorder, whose tables are joined, unless two of them have a gyro; in place of
+    one with a single recording among other files is that recording.
     """
-    return [one for path in paths for one in (_tables(path) if _of_several(path) else [path])]
-
-
-def _of_several(path: Path) -> bool:
-    """Whether it is a folder that is refused for the recordings of several sensors."""
-    return path.is_dir() and _several_in(path, _digest(path))
+    return [
+        one
+        for path in paths
+        for one in (_recordings_in(path, _digest(path)) if path.is_dir() else [path])
+    ]
 
 
 @lru_cache(maxsize=256)
-def _several_in(folder: Path, _: str) -> bool:
-    """As `_of_several`, of a folder of this digest, which is opened once and not for each look."""
+def _recordings_in(folder: Path, _: str) -> Sequence[Path]:
+    """Recordings of a folder of this digest, which is opened once and not for each look."""
     from strapdown.formats import open_stream
     from strapdown.formats.crash_records import stated_format
 
-    if stated_format(folder) is not None:
-        return False
+    # A file of a folder in a folder has no name in the studio.
+    if stated_format(folder) is not None or folder.absolute().parent != Path.cwd():
+        return [folder]
     try:
         open_stream(folder, "imu", None)
     except StrapdownError as error:
-        return error.finding.code in SEVERAL
-    return False
+        if error.finding.code in SEVERAL:
+            return _tables(folder)
+        if error.finding.code == "io.folder-of-one-recording":
+            return [Path(str(error.finding.data["path"]))]
+    return [folder]
 
 
 def _tables(folder: Path) -> list[Path]:
@@ -302,11 +358,12 @@ def _heights_of(unread: Sequence[Finding], names: Mapping[str, Path]) -> list[di
     return found
 
 
-def _questions(logs: Sequence[Any], columns: Mapping[str, str]) -> list[dict[str, Any]]:
+def _questions(logs: Sequence[Any], keys: Mapping[str, Any]) -> list[dict[str, Any]]:
     """List what the logs leave open, and how the sensor of each is mounted where none says it."""
     found = []
     for one in logs:
         name = Path(one.log.path).as_posix()
+        columns = of_file(keys, None, name)[0].get("columns", {})
         found += [question_of(f, one.answers, name, columns) for f in one.questions]
         for ask in (heights_question, axes_question):
             asked = [ask(f, name) for f in (*one.faults, *one.notes)]
@@ -320,7 +377,8 @@ def stream(
     """Return the folder of a kept stream, from the cache; it is read if it is not there."""
     place = Folder(folder)
     path = place.file(file)
-    at = _cache(place) / _key([path], _reading(log), axes or None) / plain_name(name)
+    own = of_file(_reading(log), axes or None, file)
+    at = _cache(place) / _key([path], *own) / plain_name(name)
     if not (at / LIST).is_file():
         found = look(folder, [file], log, axes)
         if not (at / LIST).is_file():
@@ -349,17 +407,47 @@ def kept_stream(
 
 def _reading(log: Mapping[str, Any]) -> dict[str, Any]:
     """Return the keys of a table ``[log]`` that say how it is read; ConfigError: it has others."""
-    known = (
-        *("format", "columns", "gyro_unit", "accel_unit", "time_unit", "sampling", "rate_hz"),
-        *("repair", "calibration", HEIGHTS),
-    )
-    part = ("path", "from_s", "to_s", "duration_s", *ROLES.values())
+    part = ("path", "from_s", "to_s", "duration_s", FOOT, OF_FILES, *ROLES.values())
+    keys = _known(log, KEYS, part)
+    own = log.get(OF_FILES) or {}
+    if not isinstance(own, dict) or not all(isinstance(one, dict) for one in own.values()):
+        raise ConfigError("studio.wrong-type", quantity=OF_FILES, wanted="keys by file")
+    of_files = {str(name): _known(one, (*KEYS, "axes")) for name, one in own.items()}
+    return keys | ({OF_FILES: of_files} if any(of_files.values()) else {})
+
+
+#: Keys that say how a file is read.
+KEYS = (
+    *("format", "columns", "gyro_unit", "accel_unit", "time_unit", "sampling", "rate_hz"),
+    *("repair", "calibration", HEIGHTS),
+)
+
+
+def _known(
+    log: Mapping[str, Any], known: Sequence[str], more: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Return the keys that are known and have a value; ConfigError: it has others than `more`."""
     for key in log:
-        if key not in known and key not in part:
+        if key not in known and key not in more:
             raise ConfigError("studio.unknown-key", word=str(key), known=known)
     # Zero is a height.
     said = {key: log[key] for key in known if log.get(key) is not None}
     return {key: value for key, value in said.items() if key == HEIGHTS or value}
+
+
+def _examined(names: Sequence[str], keys: Mapping[str, Any], axes: str | None) -> DoctorSpec:
+    """Return what is examined: each file with its own keys and axes."""
+    own = [of_file(keys, axes, name) for name in names]
+    parts = [of_each(one) for one, _ in own]
+    logs = [specify(LogTable, path=n, **p[0]) for n, p in zip(names, parts, strict=True)]
+    fixes = [specify(FixesTable, path=n, **p[1]) for n, p in zip(names, parts, strict=True) if p[1]]
+    return specify(
+        DoctorSpec,
+        name=", ".join(Path(name).stem for name in names),
+        logs=tuple(logs),
+        fixes=tuple(fixes),
+        axes=tuple(one or "" for _, one in own),
+    )
 
 
 def _cache(place: Folder) -> Path:

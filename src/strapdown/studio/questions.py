@@ -8,18 +8,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from strapdown.config.toml_text import Asked
+from strapdown.config.toml_text import Asked, Offered
 from strapdown.errors import Finding
 from strapdown.formats.recording import PLACEHOLDERS
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
 
 __all__ = [
+    "FOOT",
     "HEIGHTS",
+    "OF_FILES",
     "ROLES",
     "axes_question",
     "either_question",
+    "foot_question",
     "heights_question",
     "of_each",
+    "of_file",
+    "offered_question",
     "open_question",
     "question_of",
     "role_question",
@@ -30,6 +35,10 @@ HEIGHTS = "datum_height_m"
 #: Keys of a table ``[log]`` of the studio: which of several files is meant, by its name; empty for
 #: none of them.
 ROLES = {"samples": "samples_file", "fixes": "fixes_file", "reference": "reference_file"}
+#: Key of a table ``[log]`` of the studio with keys of single files, and their axes, by file name.
+OF_FILES = "files"
+#: Key of a table ``[log]`` of the studio: whether the sensor is on a shoe, as ``--foot``.
+FOOT = "foot"
 #: Findings about heights whose level only a person knows.
 HEIGHTS_OPEN = (
     "io.height-level-not-stated",
@@ -121,8 +130,18 @@ def heights_question(finding: Finding, file: str) -> dict[str, Any] | None:
 def of_each(keys: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Divide keys into those of samples and those of fixes, without those of `ROLES`."""
     fixes = {HEIGHTS: keys[HEIGHTS]} if HEIGHTS in keys else {}
-    others = (HEIGHTS, *ROLES.values())
+    others = (HEIGHTS, FOOT, OF_FILES, *ROLES.values())
     return {key: value for key, value in keys.items() if key not in others}, fixes
+
+
+def of_file(
+    keys: Mapping[str, Any], axes: str | None, name: str
+) -> tuple[dict[str, Any], str | None]:
+    """Return the keys and the axes of one file: what is stated of all files, and of it alone."""
+    own = dict(keys.get(OF_FILES, {}).get(name, {}))
+    own_axes = own.pop("axes", None)
+    common = {key: value for key, value in keys.items() if key != OF_FILES}
+    return {**common, **own}, own_axes or axes
 
 
 def role_question(role: str, names: Sequence[str], *, none: str = "") -> dict[str, Any]:
@@ -155,21 +174,40 @@ def either_question(name: str) -> dict[str, Any]:
     return _question(finding, name, fixes, choices, None)
 
 
+def offered_question(offered: Offered) -> dict[str, Any]:
+    """Return the question whether a table that is a comment applies."""
+    values = {f"{offered.table}.{key}": value for key, value in offered.values.items()}
+    return {
+        **_blank("studio.offered", offered.what, next(iter(values))),
+        "choices": [_choice(offered.label, values)],
+    }
+
+
+def foot_question(foot: bool) -> dict[str, Any]:
+    """Return the question whether the sensor is on a shoe, whose answer is proposed anew."""
+    finding = Finding("studio.on-foot" if foot else "studio.on-foot-or-not", severity="note")
+    label = "No, propose for a vehicle" if foot else "Yes, it is on a shoe"
+    choices = [_choice(label, {FOOT: None if foot else True})]
+    return {**_question(finding, "", FOOT, choices, None), "file": None}
+
+
 def open_question(asked: Asked, key: str, unit: str, count: int) -> dict[str, Any]:
     """Return the question for a value of a proposed configuration that only a person knows.
 
     `count`: numbers that it has, where it is a list.
     """
     return {
-        "code": "config.open-value",
-        "text": asked.what,
-        "key": key,
+        **_blank("config.open-value", asked.what, key),
         "line": asked.line,
-        "choices": [],
         "free": "number" if unit else "text",
         "unit": unit,
         "count": count,
     }
+
+
+def _blank(code: str, text: str, key: str) -> dict[str, Any]:
+    """Return a question of a proposed configuration, without answers."""
+    return {"code": code, "text": text, "key": key, "choices": [], "free": None, "unit": None}
 
 
 def _units(key: str, inferred: str, finding: Finding) -> Iterator[dict[str, Any]]:

@@ -7,6 +7,7 @@ stand beside the seal, are given away.
 
 from __future__ import annotations
 
+import html
 import json
 import re
 import shlex
@@ -18,6 +19,7 @@ from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 import numpy as np
 import pandas as pd
@@ -169,6 +171,7 @@ def run(folder: Path, name: str) -> dict[str, Any]:
         "findings": [one for one in against if (one["code"], one["text"]) not in said] + noticed,
         "versions": manifest["versions"],
         "command_line": _repeating(manifest, name),
+        "figures": _figures(place, manifest, name),
         "report": f"runs/{name}/report.html" if "report.html" in has else None,
         "has": {
             "track": "trajectory.csv" in has and manifest["command"] == "navigate",
@@ -178,6 +181,33 @@ def run(folder: Path, name: str) -> dict[str, Any]:
             "toml": _configuration(manifest) is not None,
         },
     }
+
+
+#: Drawings of a crash that its report begins with, beside its numbers: file and title.
+DRAWINGS = {
+    "pdof": "Direction of force",
+    "path": "Path from above",
+    "measuring-points": "Change of velocity at the measuring points",
+    "severity": "Severity",
+}
+#: Title of a drawing, which says in words what it shows.
+TITLE = re.compile(rb"<title>([^<]{1,2000})</title>")
+
+
+def _figures(place: Path, manifest: Mapping[str, Any], name: str) -> list[dict[str, str]]:
+    """List the drawings of the report of a crash that are shown beside its numbers.
+
+    Each has its ``title``, its ``address``, and ``alt``: what it shows, in words.
+    """
+    found = []
+    for slug, title in DRAWINGS.items() if manifest["command"] == "crash" else ():
+        with suppress(ConfigError, OSError):
+            file = f"figures/{slug}.svg"
+            with file_in(place, file, manifest).open("rb") as drawn:
+                said = TITLE.search(drawn.read(8192))
+            alt = title if said is None else html.unescape(said[1].decode(errors="replace"))
+            found.append({"title": title, "address": f"runs/{quote(name)}/{file}", "alt": alt})
+    return found
 
 
 def _opened(folder: Path, name: str) -> tuple[Path, dict[str, Any]]:
@@ -438,6 +468,26 @@ def track(folder: Path, name: str, points: int) -> dict[str, Any]:
     }
 
 
+def _input(place: Path, path: str, manifest: Mapping[str, Any]) -> Path:
+    """Return a copied input of a result: a file, or a folder that holds listed ones.
+
+    A log that is a folder has its fixes in it. ConfigError: there is none.
+    """
+    copied = {str(one["name"]) for one in manifest["inputs"] if one.get("kept") == "copy"}
+    found, own = place / path, place.resolve() / "inputs"
+    beneath = ".." not in Path(path).parts and found.resolve().is_relative_to(own)
+    if path in copied or not beneath or not found.is_dir():
+        return file_in(place, path, manifest)
+    # A reader takes whatever lies in a folder: nothing may that is not listed, or is elsewhere.
+    inside = [one for one in found.rglob("*") if not one.is_dir() or one.is_symlink()]
+    names = {one: one.relative_to(place).as_posix() for one in inside}
+    if not inside or not copied.issuperset(names.values()):
+        raise ConfigError("studio.no-such-file", file=path[:80])
+    for name in names.values():
+        file_in(place, name, manifest)
+    return found.resolve()
+
+
 def _fixes(place: Path, manifest: Mapping[str, Any], points: int) -> dict[str, Any] | None:
     """Return the fixes that the run used, if it has a copy of them."""
     from strapdown.config.logs import FixesTable
@@ -449,7 +499,7 @@ def _fixes(place: Path, manifest: Mapping[str, Any], points: int) -> dict[str, A
         if not isinstance(aid, dict) or aid.get("kind") != "gnss" or not aid.get("path"):
             continue
         with suppress(StrapdownError, OSError):
-            path = file_in(place, str(aid["path"]), manifest)
+            path = _input(place, str(aid["path"]), manifest)
             keys = {key: aid[key] for key in FixesTable.model_fields if key in aid}
             options = specify(FixesTable, **{**keys, "path": str(path)}).options()
             return _places(read_gnss(path, options), points)
@@ -464,7 +514,7 @@ def _reference(place: Path, manifest: Mapping[str, Any], points: int) -> dict[st
     if not isinstance(truth, dict) or not truth.get("path"):
         return None
     with suppress(StrapdownError, OSError):
-        path = file_in(place, str(truth["path"]), manifest)
+        path = _input(place, str(truth["path"]), manifest)
         return _places(read_trajectory(path), points)
     return None
 

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import json
+import math
+import re
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from strapdown.bundle.atomic_folder import replace_file
+from strapdown.config.toml_text import string
+from strapdown.crash.events import KMH
 from strapdown.errors import ConfigError, check_choice
 from strapdown.studio.folder import Folder
 
 __all__ = ["SAMPLES", "listed_samples", "sample"]
+
+
+#: Head of the case of the simulated crash.
+SIMULATED = "A simulated crash: what is marked as yours is the statement of the simulation."
 
 
 @dataclass(frozen=True)
@@ -47,7 +56,30 @@ def _crash() -> dict[str, bytes]:
     with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
         made = Path(name) / "crash"
         simulate("frontal").save(made)
-        return {f"crash-{p.name}": p.read_bytes() for p in sorted(made.glob("imu1_*.csv"))}
+        records = sorted(made.glob("imu1_*.csv"))
+        case = (made / "case.toml").read_text(encoding="utf-8")
+        truth = json.loads((made / "scenario.json").read_text(encoding="utf-8"))["impacts"][0]
+        own = {f"crash-{p.name}": p.read_bytes() for p in records}
+        return {**own, "crash-case.toml": _case_of_one(case, truth).encode()}
+
+
+def _case_of_one(case: str, truth: Mapping[str, Any]) -> str:
+    """Return a simulated case with its first recorder alone, whose files are in the folder.
+
+    `truth`: of its impact, which the description states.
+    """
+    head, first, *others = case.split("\n[[units]]")
+    # Without the comment above it, and what refers to files that are not copied.
+    head = head[head.index("\ntitle = ") :]
+    options = others[-1][others[-1].index("\n[options]") :]
+    text = f"{head}\n[[units]]{first}{options}".replace('\npath = "', '\npath = "crash-')
+    change = math.hypot(*truth["delta_v_m_per_s"]) / KMH
+    said = (
+        f"Simulated, with the statements of an investigator. The truth is a delta-V of {change:.1f}"
+        f" km/h and a direction of force of {truth['pdof_deg']:.1f}\N{DEGREE SIGN}."
+    )
+    text = re.sub("\ndescription = .*", f"\ndescription = {string(said)}", text)
+    return f"# {SIMULATED}\n{text}"
 
 
 SAMPLES = {
@@ -59,7 +91,8 @@ SAMPLES = {
     ),
     "crash": Sample(
         "A simulated crash",
-        "The recorder of a car that meets an obstacle with its front, in three files.",
+        "The recorder of a car that meets an obstacle with its front, in three files, and a case "
+        "for them: the answers of the simulation, whose truth is known.",
         _crash,
     ),
 }
@@ -71,7 +104,9 @@ def listed_samples() -> list[dict[str, str]]:
 
 
 def sample(folder: Path, name: str) -> dict[str, Any]:
-    """Copy a sample into the folder of the studio; return the names of its files.
+    """Copy a sample into the folder of the studio; return the names of its records.
+
+    A configuration for them is copied, too, and offered where one is proposed.
 
     ConfigError: there is no such sample, or another file has the name of one of its own.
     """
@@ -84,4 +119,4 @@ def sample(folder: Path, name: str) -> dict[str, Any]:
             raise ConfigError("studio.name-taken", file=file)
     for file, data in made.items():
         replace_file(place.path / file, data)
-    return {"files": list(made)}
+    return {"files": [file for file in made if not file.endswith(".toml")]}

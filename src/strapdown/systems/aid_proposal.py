@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,6 +52,8 @@ WEAK, DIP = 0.15, 8.0
 LEAST_SD, LEVEL = 5.0, 0.1
 #: Length at the start over which a heading is read, s.
 BEGIN = 2.0
+#: Parts of it, whose headings show whether the body turns or accelerates.
+PARTS = 4
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,9 @@ class Magnetic:
     dated : bool
     heading_deg : float
         Of the body at the start, true, as if there were no hard iron.
+    spread_deg : float
+        Standard deviation of the headings of the parts of the start, deg: of a body that turns or
+        accelerates there.
     measured, expected : tuple of float
         Strength, uT, and dip, deg, of the field at the start, and by the model.
     """
@@ -74,6 +80,7 @@ class Magnetic:
     year: float
     dated: bool
     heading_deg: float
+    spread_deg: float
     measured: tuple[float, float]
     expected: tuple[float, float]
 
@@ -88,12 +95,13 @@ class Magnetic:
         """Standard deviation of the heading, deg.
 
         Strength and dip show two components of an error of the field; the third, across it, is
-        taken to be as large, and turns the heading by itself over the horizontal field.
+        taken to be as large, and turns the heading by itself over the horizontal field. What the
+        heading does over the start is added.
         """
         (size, dip), (expected, steep) = self.measured, self.expected
         seen = math.hypot(size / expected - 1.0, math.radians(dip - steep)) / math.sqrt(2.0)
         level = max(math.cos(math.radians(steep)), LEVEL)
-        return max(LEAST_SD, math.degrees(seen / level))
+        return math.hypot(max(LEAST_SD, math.degrees(seen / level)), self.spread_deg)
 
 
 def propose_aids(
@@ -192,18 +200,32 @@ def propose_magnetometer(
     model = magnetic_field(*place, at)
     field = tuple(round(x, 2) for x in model.field_ned)
     table = {"kind": "magnetometer", **path, "field_ned_ut": field}
-    begin = imu.index[0] + BEGIN
-    force = values_of(imu[imu.index <= begin], ACCEL).mean(axis=0)
-    mag = values_of(readings[readings.index <= begin], MAG).mean(axis=0)
     down, known = np.array([0.0, 0.0, 1.0]), np.array(model.field_ned)
-    # The specific force of a body at rest is up.
-    C_nb = triad(down, known) @ triad(-force, mag).T
+
+    def attitude(begin: float, end: float) -> tuple[Array, Array]:
+        """C_nb and field of a part of the start; the mean specific force is up."""
+        force = values_of(imu.loc[begin:end], ACCEL).mean(axis=0)
+        mag = values_of(readings.loc[begin:end], MAG).mean(axis=0)
+        return triad(down, known) @ triad(-force, mag).T, mag
+
+    edges = imu.index[0] + np.linspace(0.0, BEGIN, PARTS + 1)
+    C_nb, mag = attitude(edges[0], edges[-1])
     heading = float(rotation.euler_from_dcm(C_nb)[2]) % 360.0
+    parts = itertools.pairwise(edges)
+    held = [(a, b) for a, b in parts if len(readings.loc[a:b]) and len(imu.loc[a:b])]
+    own = [rotation.euler_from_dcm(attitude(a, b)[0])[2] - heading for a, b in held]
+    spread = float(np.sqrt(np.mean(np.square(rotation.within_half_turn(np.array(own))))))
     size = float(np.linalg.norm(mag))
     dip = math.asin(float(np.clip((C_nb @ mag)[2] / size, -1.0, 1.0)))
     measured = size, math.degrees(dip)
     return Magnetic(
-        table, at, year is not None, heading, measured, (model.strength, model.inclination)
+        table,
+        at,
+        year is not None,
+        heading,
+        spread,
+        measured,
+        (model.strength, model.inclination),
     )
 
 

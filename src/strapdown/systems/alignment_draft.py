@@ -12,7 +12,7 @@ import pandas as pd
 from strapdown.config.alignment import STAGES
 from strapdown.config.choice import SLOTS, Kinds, Slot, options_of
 from strapdown.config.logs import AxesTable, LogTable
-from strapdown.config.toml_text import ASK, Asked, Page, inline, string
+from strapdown.config.toml_text import ASK, Asked, Offered, Page, inline, string
 from strapdown.errors import Finding
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.recording import Recording
@@ -50,6 +50,8 @@ class ProposedAlignment:
         Findings of reading.
     to_check : tuple of Asked
         Assumptions to check.
+    offers : tuple of Offered
+        Tables that are comments in the text.
     """
 
     text: str
@@ -57,6 +59,7 @@ class ProposedAlignment:
     asked: tuple[Asked, ...]
     findings: tuple[Finding, ...]
     to_check: tuple[Asked, ...] = ()
+    offers: tuple[Offered, ...] = ()
 
 
 def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> ProposedAlignment:

@@ -216,7 +216,7 @@ def run_doctor(spec: DoctorSpec, progress: Progress = silent) -> Diagnosis:
     for k, log in enumerate(spec.logs):
         progress(f"examining {Path(log.path).name}", 0.05 + 0.7 * k / len(spec.logs))
         try:
-            logs.append(_diagnose(log, spec.axes, by_path.get(log.path)))
+            logs.append(_diagnose(log, spec.axes_of(k), by_path.get(log.path)))
         except DataError as error:
             unread.append(error)
     if not logs:
@@ -232,8 +232,10 @@ def run_doctor(spec: DoctorSpec, progress: Progress = silent) -> Diagnosis:
     between = (*(e.finding for e in unread), *_between(logs))
     findings = tuple(f for one in logs for f in (*one.questions, *one.faults, *one.notes))
     inputs = tuple(f for x in logs for f in log_files(x.log.path, _files(x), x.log.calibration))
-    kept = [log for log in spec.logs if log.path in {x.log.path for x in logs}]
-    asked = spec.model_copy(update={"logs": tuple(kept)})
+    read = {x.log.path for x in logs}
+    kept = [k for k, log in enumerate(spec.logs) if log.path in read]
+    axes = spec.axes if not isinstance(spec.axes, tuple) else tuple(spec.axes[k] for k in kept)
+    asked = spec.model_copy(update={"logs": tuple(spec.logs[k] for k in kept), "axes": axes})
     return Diagnosis(asked, tuple(logs), between, inputs, (*findings, *between))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.logs import FixesTable, LogTable
 from strapdown.config.navigation import STAGES
-from strapdown.config.toml_text import ASK, Page, inline, named_from, string
+from strapdown.config.toml_text import ASK, Offered, Page, inline, named_from, string
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.samples import true_runs
 from strapdown.errors import DataError, Finding
@@ -129,18 +129,57 @@ def draft_navigation(
         found.append(f"{truth.name}: a reference trajectory, to compare the result with")
     _rest(page, foot, None if truth is None else named_from(truth, folder))
     return ProposedAlignment(
-        page.text, tuple(found), tuple(page.asked), made.findings, tuple(page.to_check)
+        page.text,
+        tuple(found),
+        tuple(page.asked),
+        made.findings,
+        tuple(page.to_check),
+        tuple(_offers(made, magnetic, folder)),
     )
+
+
+def _offers(made: Proposal, magnetic: Magnetic | None, folder: Path) -> Iterator[Offered]:
+    """Yield the tables that `_aids` writes as comments."""
+    if made.drives:
+        what = "Does it drive on wheels that do not slide? It bounds what an outage costs."
+        yield Offered("aiding.no_slip", WHEELS, what, "Yes, use it")
+    if magnetic is not None and not magnetic.disturbed and _asks_heading(made):
+        start = _start_of(magnetic)
+        what = (
+            f"{_magnetic(magnetic)}, with a standard deviation of {start['sd_deg']:g}°. Is no iron "
+            "near it there?"
+        )
+        yield Offered("coarse", start, what, "Yes, begin with this heading")
+    if magnetic is not None:
+        what = f"{_magnetic(magnetic)}. Is it away from iron and currents that change?"
+        table = _magnetic_table(magnetic, folder)
+        yield Offered("aiding.magnetometer", table, what, "Yes, use it for the heading")
+
+
+def _magnetic_table(found: Magnetic, folder: Path) -> dict[str, Any]:
+    """Return the table of a magnetometer, its file as named from a folder."""
+    path = found.table.get("path")
+    named = {} if path is None else {"path": named_from(Path(path), folder)}
+    return {**found.table, **named, "field_ned_ut": list(found.table["field_ned_ut"])}
+
+
+def _asks_heading(made: Proposal) -> bool:
+    """Whether only a person knows the heading at the start."""
+    coarse = made.table["coarse"]
+    return coarse["kind"] == "known_heading" and "heading_deg" not in coarse
+
+
+def _start_of(magnetic: Magnetic) -> dict[str, float]:
+    """Return the keys of a coarse alignment with the heading of a magnetometer."""
+    heading, sd = round(magnetic.heading_deg, 1), round(magnetic.heading_sd_deg, 1)
+    return {"heading_deg": heading, "sd_deg": sd}
 
 
 def _by_magnetometer(made: Proposal, magnetic: Magnetic) -> Proposal:
     """Take a heading that would be asked from an undisturbed field, for a body that is at rest."""
-    coarse = made.table["coarse"]
-    asked = coarse["kind"] == "known_heading" and "heading_deg" not in coarse
-    if not asked or magnetic.disturbed or made.rest < BEGIN:
+    if not _asks_heading(made) or magnetic.disturbed or made.rest < BEGIN:
         return made
-    heading, sd = round(magnetic.heading_deg, 1), round(magnetic.heading_sd_deg, 1)
-    coarse = {**coarse, "heading_deg": heading, "sd_deg": sd}
+    coarse = {**made.table["coarse"], **_start_of(magnetic)}
     how = f"{made.how.removesuffix(': the heading is asked')}: the heading is the magnetometer's"
     return replace(made, table={**made.table, "coarse": coarse}, how=how)
 
@@ -314,7 +353,7 @@ def _whole() -> list[Any]:
 #: Noise of a unit over that of its data sheet, which is typical of the type.
 SPREAD = 1.25
 #: Ready-made tables for a vehicle.
-WHEELS = ("[aiding.no_slip]", 'kind = "no_slip"', "mounting_sd_deg = [6.0, 6.0]")
+WHEELS = {"kind": "no_slip", "mounting_sd_deg": [6.0, 6.0]}
 
 #: Ready-made tables for a unit on a shoe.
 ON_FOOT = (
@@ -389,8 +428,7 @@ def _aids(
             "mounting angles of the unit are estimated; lever_arm_m is of the middle of the axle "
             "that is not steered."
         )
-        for line in WHEELS:
-            page.say(line)
+        _commented(page, "aiding.no_slip", WHEELS)
     aids = made.table.get("aiding", {})
     if magnetic is not None:
         _magnetometer(page, magnetic, folder)
@@ -402,7 +440,8 @@ def _aids(
         return [f"stationary for the first {made.rest:.3g} s"]
     others = [f"{kind} in the recording, proposed" for kind in LASTING_ERRORS if kind in aids]
     if magnetic is not None:
-        others.append(_magnetic(magnetic))
+        comment = "" if magnetic.disturbed else "; its table is a comment"
+        others.append(f"{_magnetic(magnetic)}{comment}")
     if made.gnss is None:
         return others
     time, own = index_of(made.gnss), index_of(made.imu)
@@ -432,7 +471,7 @@ def _magnetic(found: Magnetic) -> str:
         )
     return (
         f"magnetometer: heading {found.heading_deg:.0f}° at the start, true, by a field like the "
-        "Earth's; its table is a comment"
+        "Earth's"
     )
 
 
@@ -442,12 +481,13 @@ def _magnetometer(page: Page, found: Magnetic, folder: Path) -> None:
     page.say(
         "Is the magnetometer away from iron and currents that change? Then take the signs off. "
         f"field_ned_ut: the World Magnetic Model {dated}.",
-        "[aiding.magnetometer]",
-        'kind = "magnetometer"',
     )
-    if "path" in found.table:
-        page.say(f"path = {string(named_from(Path(found.table['path']), folder))}")
-    page.say(f"field_ned_ut = {toml_value(found.table['field_ned_ut'])}")
+    _commented(page, "aiding.magnetometer", _magnetic_table(found, folder))
+
+
+def _commented(page: Page, table: str, values: Mapping[str, Any]) -> None:
+    """Write a table as a comment."""
+    page.say(f"[{table}]", *(f"{key} = {toml_value(value)}" for key, value in values.items()))
 
 
 def _with_remarks(page: Page) -> None:

@@ -13,6 +13,7 @@ from tests.coded import coded
 from tests.town_drive import motion
 
 import strapdown as sd
+from strapdown.config.logs import DoctorSpec
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import READERS, csv, read_log
 from strapdown.formats.clocks import clock_of
@@ -293,6 +294,25 @@ def test_two_logs_of_one_body_have_an_offset(sound, tmp_path):
     (found,) = sd.doctor([one, two]).between
     assert found.code == "doctor.logs-apart"
     assert found.data["offset"] == pytest.approx(0.35, abs=5e-3)
+
+
+def test_logs_from_python_have_axes_of_their_own(sound, tmp_path):
+    paths = tmp_path / "one.csv", tmp_path / "two.csv"
+    for path in paths:
+        written(sound, path)
+    stated = "forward-right-down", "forward-left-up"
+    given = [sd.read_imu(path, axes=axes) for path, axes in zip(paths, stated, strict=True)]
+    found = sd.doctor(given)
+    for one, imu in zip(found.logs, given, strict=True):
+        assert np.array_equal(one.streams["imu"].to_numpy(), imu.to_numpy())
+    assert found.spec.axes == stated
+    # One statement for all of them has the last word.
+    alike = sd.doctor(given, axes="forward-left-up")
+    assert np.array_equal(alike.logs[0].streams["imu"].to_numpy(), given[1].to_numpy())
+    found.save(tmp_path / "found", report=False)
+    assert sd.verify(tmp_path / "found").verdict == "identical"
+    with pytest.raises(ConfigError, check=coded("config.axes-of-each-log")):
+        DoctorSpec.checked({"name": "x", "logs": [{"path": "a"}], "axes": ["x,y,z", ""]})
 
 
 def test_what_holds_nothing_is_refused_with_the_way_in(tmp_path):
