@@ -26,8 +26,8 @@ Columns = list[NDArray[Any]]
 NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
 #: Bytes of a block; the first decides which columns are numeric.
 BLOCK = 1 << 20
-#: Where all columns are numbers: bytes of a block, which stays in the cache, and threads.
-STREAMED, THREADS = 1 << 18, 4
+#: Threads that parse blocks where all columns are numbers.
+THREADS = 4
 #: Rows of a long table that are kept in memory while it is read.
 KEPT = 1 << 18
 # Null bytes and unusual line breaks, which are regular in no text.
@@ -117,7 +117,7 @@ def _streamed(
 
     with ThreadPoolExecutor(THREADS) as pool:
         begun = deque[Future[Any]]()
-        blocks = _blocks(source, start, STREAMED)
+        blocks = _blocks(source, start)
         try:
             while True:
                 # So many at once that no thread waits while the oldest is copied.
@@ -155,12 +155,12 @@ def _columns(
         yield next(of_doubles if double else of_whole)
 
 
-def _blocks(source: bytes | Path, start: int, size: int = BLOCK) -> Iterator[bytes]:
+def _blocks(source: bytes | Path, start: int) -> Iterator[bytes]:
     """Yield whole lines of a text, about a block at a time."""
     if isinstance(source, bytes):
         end = len(source)
         while start < end:
-            stop = source.rfind(b"\n", start, min(start + size, end)) + 1
+            stop = source.rfind(b"\n", start, min(start + BLOCK, end)) + 1
             if not stop:
                 stop = source.find(b"\n", start, end) + 1 or end
             yield _ended(source[start:stop])
@@ -169,7 +169,7 @@ def _blocks(source: bytes | Path, start: int, size: int = BLOCK) -> Iterator[byt
     with source.open("rb") as stream:
         stream.seek(start)
         held = b""
-        while block := stream.read(size):
+        while block := stream.read(BLOCK):
             lines, newline, rest = block.rpartition(b"\n")
             if newline:
                 yield held + lines + newline
