@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
 import shutil
+import time
 
 import pytest
 from tests.coded import coded
@@ -11,7 +14,9 @@ from tests.coded import coded
 from strapdown import simulate, verify
 from strapdown.api.attitude import compare_attitude
 from strapdown.bundle import (
+    LARGE,
     MANIFEST,
+    SETTLED,
     InputFiles,
     atomic_folder,
     found_references,
@@ -384,6 +389,28 @@ def test_a_log_that_changed_since_it_was_read_is_not_sealed(tmp_path, log):
     with pytest.raises(DataError, check=coded("bundle.input-changed")):
         write_attitude(bench, tmp_path / "out", report=False)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="whose stamps of changes no program can set")
+def test_a_large_log_is_read_for_its_digest_once(tmp_path, monkeypatch):
+    log, read = tmp_path / "log.csv", []
+    log.write_bytes(bytes(LARGE))
+    digest = hashlib.file_digest
+    monkeypatch.setattr(hashlib, "file_digest", lambda *of: read.append(1) or digest(*of))
+    before = sha256(log)
+    assert sha256(log) == before
+    assert len(read) == 2  # it was just written, so that a change may have the same stamp
+    now = time.time_ns()
+    monkeypatch.setattr(time, "time_ns", lambda: now + 2 * SETTLED)
+    assert [sha256(log), sha256(log)] == [before, before]
+    assert len(read) == 3
+    # A byte within it, with the stamp of before.
+    about = log.stat()
+    with log.open("r+b") as stream:
+        stream.seek(LARGE // 2)
+        stream.write(b"x")
+    os.utime(log, ns=(about.st_atime_ns, about.st_mtime_ns))
+    assert sha256(log) != before
 
 
 def test_the_old_bundle_stays_where_the_new_one_cannot_be_put(tmp_path, bench, monkeypatch):

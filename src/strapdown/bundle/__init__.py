@@ -15,12 +15,13 @@ import os
 import platform
 import re
 import shutil
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from strapdown.bundle import atomic_folder
 from strapdown.bundle.atomic_folder import MANIFEST as MANIFEST
@@ -80,10 +81,37 @@ class Seal:
     digest: str
 
 
+#: Digests of large files, by what shows that one has not changed since, the oldest first.
+_KNOWN: dict[tuple[int, ...], str] = {}
+_MOST_KNOWN = 64
+#: Size from which a digest takes a noticeable time, bytes; and time since the last change from
+#: which on another one has another stamp, whatever the resolution of the clock of a file, ns.
+LARGE, SETTLED = 1 << 24, 2_000_000_000
+
+
 def sha256(path: Path) -> str:
-    """SHA-256 of a file, in hexadecimal."""
+    """SHA-256 of a file, in hexadecimal.
+
+    A log is read for it once, though it is asked for again when a result is sealed: the system
+    changes the stamp of a file (ctime) with its content, and no program can set that stamp.
+    """
     with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+        state, begun = _state(stream), time.time_ns()
+        if state not in _KNOWN:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+            *_, size, modified, changed = state
+            settled = max(modified, changed) < begun - SETTLED and _state(stream) == state
+            if os.name != "posix" or size < LARGE or not settled:
+                return digest
+            while len(_KNOWN) >= _MOST_KNOWN:
+                _KNOWN.pop(next(iter(_KNOWN)), None)
+            _KNOWN[state] = digest
+        return _KNOWN[state]
+
+
+def _state(stream: BinaryIO) -> tuple[int, ...]:
+    about = os.fstat(stream.fileno())
+    return about.st_dev, about.st_ino, about.st_size, about.st_mtime_ns, about.st_ctime_ns
 
 
 def input_files(role: str, path: str, files: tuple[Path, ...]) -> InputFiles:

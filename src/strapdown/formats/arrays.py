@@ -207,9 +207,11 @@ def excel_nanoseconds(values: NDArray[Any]) -> NDArray[np.int64] | None:
 
     `values` ((n,)). The step decides: as seconds, no inertial sensor would have it.
     """
-    if values.dtype.kind != "f" or values.size < 2 or not np.isfinite(values).all():
-        return None
     low, high = _EXCEL_DAYS
+    if values.dtype.kind != "f" or values.size < 2 or not low <= values[0] <= high:
+        return None
+    if not np.isfinite(values).all():
+        return None
     steps = np.diff(values)
     forward = steps[steps > 0.0]
     if not (low <= values.min() and values.max() <= high and forward.size):

@@ -200,14 +200,15 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     summed = {t for t, (unit, _) in units.items() if unit in SUMS[t]}
     begins = {triad: values[triad][kept[0]].copy() for triad in units}
     factors = {t: factor_of(unit, {**UNITS[t], **SUMS[t]}) for t, (unit, _) in units.items()}
-    for begin in range(0, kept.size, AT_ONCE):
+    changed = [t for t in units if not _are_body(values[t], axes, factors[t], body[t])]
+    for begin in range(0, kept.size if changed else 0, AT_ONCE):
         rows = slice(begin, begin + AT_ONCE)
         used = {
             # A copy, as the body axes may take the memory of the sensor's.
             triad: values[triad][rows].copy(order="K") if whole else values[triad][kept[rows]]
-            for triad in units
+            for triad in changed
         }
-        for triad in units:
+        for triad in changed:
             _turn(used[triad], axes, factors[triad], body[triad][rows])
             let_go(values[triad])
         let_go(block)
@@ -521,6 +522,12 @@ def _block(
     rows = as_rows(columns) if columns[0].size == count and not keep else None
     block = (room((3 * len(names), count)) if rows is None else rows).T
     return {triad: block[:, 3 * k : 3 * k + 3] for k, triad in enumerate(names)}, block
+
+
+def _are_body(values: Array, axes: Axes, factor: float, body: Array) -> bool:
+    """Whether a triad is where its body axes go, and already in these and in SI units."""
+    same = values.__array_interface__ == body.__array_interface__
+    return same and factor == 1.0 and (axes.axis, axes.sign) == AS_THEY_ARE
 
 
 def _turn(values: Array, axes: Axes, factor: float, body: Array) -> None:

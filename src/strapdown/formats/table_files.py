@@ -24,6 +24,7 @@ from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 from strapdown.parsers import parse
 from strapdown.parsers.archives import numpy_array
+from strapdown.tables.on_disk import room
 
 # Excel workbooks (``.xlsx``) by openpyxl: the sheet with the most numbers, as a table.
 #
@@ -396,7 +397,7 @@ def read_parquet(path: Path) -> RawLog:
     DataError
         The file is damaged, or declares far more data than it holds.
     """
-    found = parse("parquet.table", path)
+    found = parse("parquet.table", path, room=room)
     return raw_log(path, found["arrays"], found["units"], found["meta"])
 
 

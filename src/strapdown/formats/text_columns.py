@@ -6,9 +6,11 @@
 
 from __future__ import annotations
 
-import os
+from collections import deque
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any, Literal
 
@@ -24,8 +26,8 @@ Columns = list[NDArray[Any]]
 NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
 #: Bytes of a block; the first decides which columns are numeric.
 BLOCK = 1 << 20
-#: Bytes that are parsed at a time where all columns are numbers; they stay in the cache.
-STREAMED = 1 << 18
+#: Threads that parse blocks where all columns are numbers.
+THREADS = 4
 #: Rows of a long table that are kept in memory while it is read.
 KEPT = 1 << 18
 # Null bytes and unusual line breaks, which are regular in no text.
@@ -98,41 +100,47 @@ def _streamed(
     import pyarrow as pa
     import pyarrow.csv as pa_csv
 
-    # Arrow reads whole numbers with an x as hexadecimal.
     doubles = [str(t) != "int64" for t in types.values()]
-    if not all(doubles) and any(b"x" in b or b"X" in b for b in _blocks(source, start)):
-        return None
-    view = memoryview(source)[start:] if isinstance(source, bytes) else b""
-    size = len(view) if isinstance(source, bytes) else source.stat().st_size - start
+    size = (len(source) if isinstance(source, bytes) else source.stat().st_size) - start
     # Doubles are rows of one array, which the table of the log keeps.
     room = int(1.02 * size / width) + 16
     block = on_disk.room((sum(doubles), room))
     whole = np.empty((len(doubles) - len(block), room), dtype=np.int64)
     rows = 0
-    try:
-        with (
-            pa.BufferReader(view)
-            if isinstance(source, bytes)
-            else pa.OSFile(os.fsencode(source)) as held
-        ):
-            held.seek(0 if isinstance(source, bytes) else start)
-            options = _options(types, len(types), separator, ".", False)
-            options[0].block_size = STREAMED
-            for batch in pa_csv.open_csv(held, *options):
-                end = rows + batch.num_rows
+    options = _options(types, len(types), separator, ".", False)
+
+    def read(lines: bytes) -> Any:
+        # Arrow reads whole numbers with an x as hexadecimal.
+        if not all(doubles) and (b"x" in lines or b"X" in lines):
+            raise pa.ArrowInvalid
+        return pa_csv.read_csv(pa.BufferReader(lines), *options)
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        begun = deque[Future[Any]]()
+        blocks = _blocks(source, start)
+        try:
+            while True:
+                # So many at once that no thread waits while the oldest is copied.
+                begun += [pool.submit(read, b) for b in islice(blocks, 2 * THREADS - len(begun))]
+                if not begun:
+                    break
+                table = begun.popleft().result()
+                end = rows + table.num_rows
                 if end > room:
                     more = ((0, 0), (0, 2 * end - room))
                     block, whole, room = np.pad(block, more), np.pad(whole, more), 2 * end
                 held_now = _columns(block, whole, doubles)
-                for column, parsed_now in zip(held_now, batch.columns, strict=True):
+                for column, parsed_now in zip(held_now, table.columns, strict=True):
                     if parsed_now.null_count:
                         return None
                     column[rows:end] = parsed_now.to_numpy()
                 if end // KEPT > rows // KEPT:
                     on_disk.let_go(block)
                 rows = end
-    except pa.ArrowInvalid:
-        return None
+        except pa.ArrowInvalid:
+            return None
+        finally:
+            pool.shutdown(cancel_futures=True)
     on_disk.let_go(block)
     pa.default_memory_pool().release_unused()
     return [column[:rows] for column in _columns(block, whole, doubles)]

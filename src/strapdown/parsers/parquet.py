@@ -15,6 +15,8 @@ from strapdown.parsers.limits import refuse_lie, refuse_total
 UNITS = (b"unit", b"units")
 #: Most columns: each takes memory, whatever it holds.
 MOST_COLUMNS = 20_000
+#: Bytes of a column that are read at a time, and of numbers that are decoded at a time.
+BUFFER, PART = 1 << 16, 1 << 22
 
 
 def table(path: Path) -> dict[str, Any]:
@@ -23,7 +25,8 @@ def table(path: Path) -> dict[str, Any]:
     DataError: the file is damaged, or declares far more data than it holds.
     """
     try:
-        with pq.ParquetFile(path) as file:
+        # Otherwise all of the file is in memory before the first number is decoded.
+        with pq.ParquetFile(path, pre_buffer=False, buffer_size=BUFFER) as file:
             rows, width = file.metadata.num_rows, max(file.metadata.num_columns, 1)
             refuse_lie(rows * width * 8, path.stat().st_size, "table", path.name)
             refuse_total(rows * width * 8, path)
@@ -31,16 +34,19 @@ def table(path: Path) -> dict[str, Any]:
                 raise DataError(
                     "io.too-many-columns-of-table", file=path.name, count=width, most=MOST_COLUMNS
                 )
-            held = file.read(use_threads=False)
-        while any(pa.types.is_struct(field.type) for field in held.schema):
-            held = held.flatten()
-        meta = {_text(k): _text(v) for k, v in (held.schema.metadata or {}).items()}
-        units = _units(held)
-        arrays = {}
-        # Column by column, so that at most one is in memory twice.
-        for name in held.column_names:
-            arrays[name] = _array(held.column(0))
-            held = held.remove_column(0)
+            schema, numbers = file.schema_arrow, _numbers(file, rows)
+            held = file.read(use_threads=False) if numbers is None else None
+        arrays: dict[str, np.ndarray[Any, Any] | None] = {**(numbers or {})}
+        if held is not None:
+            while any(pa.types.is_struct(field.type) for field in held.schema):
+                held = held.flatten()
+            schema = held.schema
+            # Column by column, so that at most one is in memory twice.
+            for name in held.column_names:
+                arrays[name] = _array(held.column(0))
+                held = held.remove_column(0)
+        meta = {_text(k): _text(v) for k, v in (schema.metadata or {}).items()}
+        units = _units(schema)
         pa.default_memory_pool().release_unused()
     except (DataError, MemoryError):
         raise
@@ -50,8 +56,8 @@ def table(path: Path) -> dict[str, Any]:
             file=path.name,
             splitlines=str(error).splitlines()[0] if str(error) else "damaged",
         ) from None
-    arrays = {n: a for n, a in arrays.items() if a is not None}
-    return {"arrays": arrays, "units": units, "meta": meta}
+    found = {name: array for name, array in arrays.items() if array is not None}
+    return {"arrays": found, "units": units, "meta": meta}
 
 
 def with_bytes(path: Path) -> dict[str, Any]:
@@ -67,9 +73,34 @@ def with_bytes(path: Path) -> dict[str, Any]:
     return found
 
 
-def _units(held: Any) -> dict[str, str]:
+def _numbers(file: pq.ParquetFile, rows: int) -> dict[str, np.ndarray[Any, Any]] | None:
+    """Read columns of numbers alone part by part, which needs a part of memory beside them.
+
+    None if there is another column, a missing whole number, or another number of rows.
+    """
+    fields = list(file.schema_arrow)
+    plain = (pa.types.is_integer, pa.types.is_float32, pa.types.is_float64)
+    if len({field.name for field in fields}) < len(fields):
+        return None
+    if not fields or not all(any(kind(field.type) for kind in plain) for field in fields):
+        return None
+    arrays = {field.name: np.empty(rows, field.type.to_pandas_dtype()) for field in fields}
+    begin = 0
+    for part in file.iter_batches(max(1024, PART // (8 * len(fields))), use_threads=False):
+        end = begin + part.num_rows
+        if end > rows:
+            return None
+        for column, values in zip(part.columns, arrays.values(), strict=True):
+            if column.null_count and pa.types.is_integer(column.type):
+                return None
+            values[begin:end] = column.to_numpy(zero_copy_only=False)
+        begin = end
+    return arrays if begin == rows else None
+
+
+def _units(schema: pa.Schema) -> dict[str, str]:
     found = {}
-    for field in held.schema:
+    for field in schema:
         for key in UNITS:
             if key in (field.metadata or {}):
                 found[field.name] = _text(field.metadata[key])

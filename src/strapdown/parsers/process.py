@@ -21,10 +21,16 @@ import threading
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.parsers.limits import declared_most, memory_most, seconds_most, size_of, text_most
+
+if TYPE_CHECKING:
+    from strapdown.parsers.wire import Room
+
+if sys.platform == "linux":
+    import fcntl
 
 __all__ = ["in_place", "parse", "start", "start_for"]
 
@@ -35,6 +41,8 @@ ENDINGS = (
     *(".ulg", ".ulog", ".bag", ".mcap", ".db3", ".ubx", ".tlog", ".fit", ".gpx"),
 )
 
+#: Bytes that pass at a time, where the system can; each time, the two processes take turns.
+PIPE = 1 << 20
 #: Time on a clock for one of the processor: other programs run, too.
 PATIENCE = 3.0
 #: How long its own clock may be late before it is ended from outside, s.
@@ -71,7 +79,15 @@ def in_place() -> Iterator[None]:
         _in_place = before
 
 
-def parse(function: str, path: Path, *, label: str = "", memory: int = 0, **arguments: Any) -> Any:
+def parse(
+    function: str,
+    path: Path,
+    *,
+    label: str = "",
+    memory: int = 0,
+    room: Room | None = None,
+    **arguments: Any,
+) -> Any:
     """Run a function on a file in the process that parses.
 
     Parameters
@@ -85,6 +101,8 @@ def parse(function: str, path: Path, *, label: str = "", memory: int = 0, **argu
         Name of the file in messages; by default that of `path`.
     memory : int, bytes
         Limit of memory instead of `limits.memory_most`.
+    room : callable, optional
+        Makes an array of a shape, of which columns of doubles that follow one another are rows.
     **arguments
         Further ones, of JSON.
 
@@ -123,7 +141,7 @@ def parse(function: str, path: Path, *, label: str = "", memory: int = 0, **argu
     }
     try:
         with _lock:
-            answer = _exchange(asked, label, (declared_most(size), text_most(size)))
+            answer = _exchange(asked, label, (declared_most(size), text_most(size), room))
         return _taken(answer, label, memory)
     except DataError as error:
         if state and error.finding.code in _LASTING and not error.finding.data.get("on_clock"):
@@ -176,18 +194,24 @@ def _running() -> subprocess.Popen[bytes]:
             start_new_session=True,
             creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
         )
+        if sys.platform == "linux" and _process and _process.stdout:
+            with contextlib.suppress(OSError):  # more than this user may have
+                fcntl.fcntl(_process.stdout, fcntl.F_SETPIPE_SZ, PIPE)
     return _process
 
 
-def _exchange(asked: dict[str, Any], label: str, most: tuple[int, int]) -> Any:
-    """Send a request, and return the answer to it, which has at `most` so much; `_lock` is held."""
+def _exchange(asked: dict[str, Any], label: str, limits: tuple[int, int, Room | None]) -> Any:
+    """Send a request, and return the answer to it within the limits of `wire.decode`.
+
+    `_lock` is held.
+    """
     from strapdown.parsers import wire
 
     whole = False
     try:
         process = _asked(json.dumps(asked).encode() + b"\n", label)
         with _watched(process, asked["patience"] + LATE) as stream:
-            answer = wire.decode(stream, *most)
+            answer = wire.decode(stream, *limits)
         whole = True
         return answer
     except TimeoutError:

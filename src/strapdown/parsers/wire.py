@@ -8,6 +8,7 @@ taken, because the sender has parsed a file that nobody vouches for.
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import struct
@@ -30,6 +31,7 @@ _MOMENTS: dict[str, Callable[[str], Any]] = {
     "\0time": time.fromisoformat,
 }
 _LAST_CODE_POINT = 0x10FFFF
+Room = Callable[[tuple[int, int]], np.ndarray[Any, Any]]
 
 
 class BrokenAnswerError(Exception):
@@ -69,20 +71,31 @@ def encode(value: Any) -> list[Any]:
     return [_LENGTHS.pack(len(head), size), head, *(a.view(np.uint8) for a in arrays if a.nbytes)]
 
 
-def decode(stream: Any, most: int, most_text: int | None = None) -> Any:
+def decode(stream: Any, most: int, most_text: int | None = None, room: Room | None = None) -> Any:
     """Read a tree.
 
-    `most`: bytes that its arrays may have. `most_text`: that the rest may. EOFError: the stream
-    ended. BrokenAnswerError: it is not a tree.
+    `most`: bytes that its arrays may have. `most_text`: that the rest may. `room`: makes an array,
+    (k, n), of which successive arrays of n doubles are the rows. EOFError: the stream ended.
+    BrokenAnswerError: it is not a tree.
     """
     head, size = _LENGTHS.unpack(_exactly(stream, _LENGTHS.size))
     if size > most or head > (most if most_text is None else most_text):
         raise BrokenAnswerError(f"{head + size} bytes")
     try:
         about, text = json.loads(_exactly(stream, head))
-        if sum(int(nbytes) for *_, nbytes in about) != size:
+        sizes = [int(nbytes) for *_, nbytes in about]
+        if min(sizes, default=0) < 0 or sum(sizes) != size:
             raise BrokenAnswerError("sizes")
-        arrays = [_array(stream, *one) for one in about]
+        arrays: list[np.ndarray[Any, Any]] = []
+        for alike, some in itertools.groupby(about, key=lambda one: (one[0], one[1])):
+            group = list(some)
+            rows: Any = [None] * len(group)
+            if room is not None and alike[0] == "<f8" and len(alike[1]) == 1:
+                count = int(alike[1][0])
+                if any(int(nbytes) != 8 * count for *_, nbytes in group):
+                    raise BrokenAnswerError("shape")
+                rows = room((len(group), count))
+            arrays += [_array(stream, row, *one) for one, row in zip(group, rows, strict=True)]
 
         def untagged(one: dict[str, Any]) -> Any:
             if _ARRAY in one:
@@ -106,21 +119,29 @@ def decode(stream: Any, most: int, most_text: int | None = None) -> Any:
 
 
 def _array(
-    stream: Any, dtype: str, shape: list[int], turned: bool, nbytes: int
+    stream: Any,
+    row: np.ndarray[Any, Any] | None,
+    dtype: str,
+    shape: list[int],
+    turned: bool,
+    nbytes: int,
 ) -> np.ndarray[Any, Any]:
+    """Read an array, of one dimension into `row` if it is given."""
     if not _DTYPE.fullmatch(dtype):
         raise BrokenAnswerError("dtype")
     kind = np.dtype(dtype)
     count = int(np.prod([int(n) for n in shape], dtype=object))
     if min(shape, default=0) < 0 or count * kind.itemsize != nbytes:
         raise BrokenAnswerError("shape")
-    values = np.empty(count, dtype=kind)
+    values = np.empty(count, dtype=kind) if row is None else row
     if nbytes:
         _into(stream, values.view(np.uint8).data)
     if kind.kind == "U" and nbytes:
         order: Any = kind.byteorder
         if values.view(np.dtype(np.uint32).newbyteorder(order)).max() > _LAST_CODE_POINT:
             raise BrokenAnswerError("text")
+    if row is not None:
+        return row
     return values.reshape(shape[::-1]).T if turned else values.reshape(shape)
 
 

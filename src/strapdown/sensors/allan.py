@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import DataError
+from strapdown.tables.on_disk import let_go
 
 Array = NDArray[np.float64]
 
@@ -62,6 +63,7 @@ def deviations(
     for values in records:
         phase = np.empty(values.size + 1)
         integrate(values, float(values.mean()), phase)
+        let_go(values)
         short = int(np.searchsorted(chosen, values.size // 2, side="right"))
         own = np.empty((short, 6))
         overlapping_variances(phase, chosen[:short], own)

@@ -338,8 +338,19 @@ def sd_of_mean(time: Array, values: Array) -> Array:
     doi:10.1287/opre.32.6.1241). A stretch of less than 2 s is too short for that: its n values
     count as ``n (1 - r) / (1 + r)``, with r the autocorrelation from value to value.
     """
+    return _sd_of_mean(time, values, _of_columns(_squares, values))
+
+
+def _squares(values: Array, axis: int = 0) -> Array:
+    """Sum of squares about the mean, of (n,) or (n, k)."""
+    off = values - values.mean(axis=axis)
+    return np.asarray(np.multiply(off, off, out=off).sum(axis=axis))
+
+
+def _sd_of_mean(time: Array, values: Array, squares: Array) -> Array:
+    """Return `sd_of_mean`; `squares`: of the values about their mean."""
     n = len(values)
-    white = _of_columns(np.std, values, ddof=1) / np.sqrt(n)
+    white = np.sqrt(squares / (n - 1)) / np.sqrt(n)
     parts = min(MOST_PARTS, int((time[-1] - time[0]) / WINDOW))
     edges = np.linspace(0, n, max(parts, 1) + 1).astype(np.int64)
     if parts < LEAST_PARTS or np.diff(edges).min() < 1:
@@ -377,16 +388,28 @@ def field_turned(imu: pd.DataFrame, rest: RestStretch) -> bool:
 
 
 def _stretch(time: Array, gyro: Array, accel: Array | None, a: int, b: int) -> RestStretch:
-    force = None if accel is None else accel[a:b]
+    of_gyro = _moments(time[a:b], gyro[a:b])
+    of_accel = (None, None, None) if accel is None else _moments(time[a:b], accel[a:b])
+    means, spreads, errors = zip(of_gyro, of_accel, strict=True)
     return RestStretch(
         float(time[a]),
         float(time[b - 1]),
-        triad_of(_of_columns(np.mean, gyro[a:b])),
-        triad_of(_of_columns(np.std, gyro[a:b])),
-        None if force is None else triad_of(_of_columns(np.mean, force)),
-        triad_of(sd_of_mean(time[a:b], gyro[a:b])),
-        None if force is None else triad_of(_of_columns(np.std, force)),
-        None if force is None else triad_of(sd_of_mean(time[a:b], force)),
+        means[0],
+        spreads[0],
+        means[1],
+        errors[0],
+        spreads[1],
+        errors[1],
+    )
+
+
+def _moments(time: Array, values: Array) -> tuple[Triple, Triple, Triple]:
+    """Mean, standard deviation, and that of the mean of a stretch."""
+    squares = _of_columns(_squares, values)
+    return (
+        triad_of(_of_columns(np.mean, values)),
+        triad_of(np.sqrt(squares / len(values))),
+        triad_of(_sd_of_mean(time, values, squares)),
     )
 
 

@@ -50,6 +50,8 @@ LEAST_REST, SHORT = 60.0, 1800.0  # s
 SAME_RATE = 0.01
 #: Share of a log outside its longest rest from which the result says so.
 MOVED = 0.02
+#: Threads for deviations and digests, which take longer than the fits.
+BESIDE = 2
 #: Change of temperature of which an effect is estimated, °C; where it may be missing, s.
 LEAST_WARMING, EDGE = 0.5, 10.0
 #: Flat minimum of the Allan deviation of flicker, √(2 ln 2/π) B.
@@ -261,9 +263,13 @@ def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
     def deviations_of(channel: str) -> pd.DataFrame:
         return deviations([rest.values(channel) for rest in rests], dt)
 
-    # Beside the fits, as their kernel needs no lock of Python; no bit depends on it.
-    with ThreadPoolExecutor(1) as beside:
+    # Beside the fits, as these need no lock of Python; no bit depends on it.
+    with ThreadPoolExecutor(BESIDE) as beside:
         made = {channel: beside.submit(deviations_of, channel) for channel in channels}
+        inputs = [
+            beside.submit(log_files, log.path, one.files, log.calibration)
+            for log, one in zip(spec.logs, rests, strict=True)
+        ]
         for k, channel in enumerate(channels):
             progress(f"noise of {channel}", 0.2 + 0.55 * k / len(channels))
             values = [rest.values(channel) for rest in rests]
@@ -294,11 +300,7 @@ def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
             for one, mean in zip(rests, means, strict=True)
         ),
         1.0 / dt,
-        tuple(
-            file
-            for log, one in zip(spec.logs, rests, strict=True)
-            for file in log_files(log.path, one.files, log.calibration)
-        ),
+        tuple(file for one in inputs for file in one.result()),
     )
 
 

@@ -13,6 +13,7 @@ from tests.coded import coded
 from strapdown import frames, rotation
 from strapdown.errors import DataError
 from strapdown.formats import READERS, read_log, read_raw
+from strapdown.formats.arrays import as_rows
 from strapdown.formats.recording import ReadOptions
 from strapdown.tables import ACCEL, GYRO, QUATERNION
 
@@ -87,6 +88,32 @@ def test_parquet_missing_values_are_missing(tmp_path):
         check=coded("io.not-finite-in-rows", row=6, file="log.parquet", quantity="gyro_x"),
     ):
         read_log(path, ReadOptions(gyro_unit="rad/s"))
+
+
+@pytest.mark.parametrize("rows", [500, 3000])
+def test_parquet_of_numbers_alone_is_decoded_in_parts_to_rows_of_one_array(tmp_path, rows):
+    """Every kind of number as Arrow converts the whole column, and missing ones as NaN."""
+    draw = np.random.default_rng(1)
+    doubles = {f"g{a}": draw.normal(size=rows) for a in "xyz"}
+    doubles["gy"][7] = np.nan
+    columns = {
+        "t": np.arange(rows),
+        **doubles,
+        "small": draw.normal(size=rows).astype(np.float32),
+        "count": np.arange(rows, dtype=np.uint16),
+        "some": pa.array([None if k == 1234 else 0.5 * k for k in range(rows)]),
+    }
+    path, meta = tmp_path / "log.parquet", {"sampling": "mean"}
+    pq.write_table(table(columns, {"gx": "deg/s"}.items(), meta), path, row_group_size=700)
+    raw = read_raw(path)
+    held = pq.read_table(path)
+    assert list(raw.columns) == held.column_names
+    for name, values in raw.columns.items():
+        expected = held[name].to_numpy()
+        assert (values.dtype, values.tobytes()) == (expected.dtype, expected.tobytes()), name
+    assert raw.units == {"gx": "deg/s"}
+    assert raw.sampling == "mean"
+    assert as_rows([raw.columns[f"g{a}"] for a in "xyz"]).shape == (3, rows)
 
 
 @pytest.mark.parametrize("keep", [3, 200, -30])

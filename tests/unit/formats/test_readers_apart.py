@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import json
 import os
 import random
 import signal
@@ -457,8 +458,16 @@ def test_trees_come_back():
     assert texts.tolist() == ["a", "None"]
 
 
-def test_what_is_no_answer_is_refused():
+@pytest.mark.parametrize("roomy", [False, True])
+def test_what_is_no_answer_is_refused(roomy):
     """Nothing but an end or a refusal: no other exception, no memory, no object."""
+    taken = [0]
+
+    def taking(shape):
+        taken.append(8 * shape[0] * shape[1])
+        return np.empty(shape)
+
+    room = taking if roomy else None
     good = b"".join(wire.encode({"a": np.arange(3.0), "b": np.array(["a"]), "c": b"abc"}))
     draw = random.Random(1)
     for _ in range(3000):
@@ -466,13 +475,19 @@ def test_what_is_no_answer_is_refused():
         for _ in range(1 + draw.randrange(3)):
             data[draw.randrange(len(data))] = draw.randrange(256)
         with contextlib.suppress(wire.BrokenAnswerError, EOFError):
-            wire.decode(io.BytesIO(bytes(data)), 1 << 16)
+            wire.decode(io.BytesIO(bytes(data)), 1 << 16, room=room)
     for dtype, shape, size in (("|O", [1], 8), ("<f8", [-1], -8), ("<f8", [2], 8), ("<U1", [1], 4)):
         body = b"\xff" * 8
         head = f'[[["{dtype}", {shape}, false, {size}]], "{{}}"]'.encode()
         answer = struct.pack("<QQ", len(head), max(size, 0)) + head + body
         with pytest.raises((wire.BrokenAnswerError, EOFError)):
-            wire.decode(io.BytesIO(answer), 1 << 16)
+            wire.decode(io.BytesIO(answer), 1 << 16, room=room)
+    # Sizes that together are as announced, of which one is not.
+    parts = [["<f8", [1 << 40], False, 1 << 43], ["<f8", [1], False, 8 - (1 << 43)]]
+    head = json.dumps([parts, "{}"]).encode()
+    with pytest.raises(wire.BrokenAnswerError):
+        wire.decode(io.BytesIO(struct.pack("<QQ", len(head), 8) + head + body), 1 << 16, room=room)
+    assert max(taken) <= 1 << 16
 
 
 @pytest.mark.parametrize(
