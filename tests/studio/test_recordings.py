@@ -61,8 +61,8 @@ ZOO = (
 )
 #: Files of a folder that are no recordings.
 WORDS = (".md", ".txt", "")
-#: Longest part that is run, s; seconds that a request may take.
-PART, WAIT = 20.0, 400.0
+#: Longest part that is run, s, more than a rest at its start; seconds that a request may take.
+PART, WAIT = 60.0, 400.0
 #: Uses of `doctor` by the kinds that are run, and answers by which they are said to be possible.
 USES = {"navigate": "navigation", "attitude": "attitude", "crash": "crash"}
 POSSIBLE = ("yes", "with limits")

@@ -347,6 +347,20 @@ def test_a_table_of_an_event_data_recorder(tmp_path):
     assert table["accel_x"].sum() * 0.01 == pytest.approx(-26.0 / 3.6, rel=1e-9)
 
 
+def test_a_gyro_about_the_vertical_alone_leaves_the_other_turns_to_the_user(pole, tmp_path):
+    time, (low, _, gyro) = tables(pole["IMU1"])
+    path = write(
+        tmp_path / "yaw.csv",
+        "t [s],ax [m/s2],ay [m/s2],az [m/s2],yaw rate [deg/s]",
+        np.column_stack([time, low, np.degrees(gyro[:, 2])]),
+    )
+    draft, table = drafted(tmp_path, path)
+    (unit,) = table["units"]
+    assert set(unit["gyro"]["channels"]) == {"z"}
+    assert unit["assumed"] == {"turn_sd_deg": "?", "because": "?"}
+    assert filled(draft, tmp_path).units[0].assumed.turn_sd_deg == 3.0
+
+
 def test_the_crash_test_of_nhtsa(recordings, tmp_path):
     draft, table = drafted(tmp_path, recordings("crash_nhtsa_10146"))
     assert table["vehicle"]["mass_kg"] == 1719.0
