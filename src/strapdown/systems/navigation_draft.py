@@ -42,6 +42,8 @@ from strapdown.tables.checks import index_of, source_of, values_of
 __all__ = ["STANCE", "STANDING", "draft_navigation", "first_stand", "on_foot", "second_order"]
 
 
+#: Lever arm that vehicles have, m.
+ARM = 2.0
 #: Finding of a kind of sampling that is not stated; turns are means over so many seconds.
 UNSTATED, STEADY = "io.sampling-taken-as-instantaneous", 0.5
 #: Errors of other sensors in the recording, as comments of their tables.
@@ -421,7 +423,8 @@ def _aids(
                     f"assumed: the fixes do not state it; {usual}",
                     check=f"standard deviation of the {what} of each fix: {usual}",
                 )
-        options(page, slot.entries[aid["kind"]], aid)
+        arm = _arm(made.gnss) if aid["kind"] == "gnss" else ""
+        options(page, slot.entries[aid["kind"]], aid, {"lever_arm_m": arm})
     if made.drives:
         page.say(
             "Does it drive on wheels? Then take the signs off; it bounds what an outage costs. The "
@@ -488,6 +491,17 @@ def _magnetometer(page: Page, found: Magnetic, folder: Path) -> None:
 def _commented(page: Page, table: str, values: Mapping[str, Any]) -> None:
     """Write a table as a comment."""
     page.say(f"[{table}]", *(f"{key} = {toml_value(value)}" for key, value in values.items()))
+
+
+def _arm(gnss: pd.DataFrame | None) -> str:
+    """Consequence of a lever arm of zero; empty where fixes are coarse against a usual one."""
+    sd = math.inf if gnss is None else float(np.nanmedian(values_of(gnss, POSITION_SD)[:, :2]))
+    if not sd < ARM:
+        return ""
+    return (
+        "zero, as of an antenna on the sensors: measure it, forward, right, down; an arm of 1 m is "
+        f"1 m of position that no bound has, beside fixes of ± {sd:.2g} m (1 sd)"
+    )
 
 
 def _with_remarks(page: Page) -> None:

@@ -1,4 +1,4 @@
-"""`init navigate` lists the assumed kind of sampling where half a sample matters."""
+"""`init navigate` lists assumptions that matter: half a sample, and a lever arm of zero."""
 
 from types import SimpleNamespace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.errors import Finding
-from strapdown.systems.navigation_draft import _sampling_to_check
+from strapdown.systems.navigation_draft import _arm, _sampling_to_check
 from strapdown.tables import gnss_table, imu_table
 
 ASSUMED = (Finding("io.sampling-taken-as-instantaneous", severity="note", quantity="sampling"),)
@@ -34,3 +34,9 @@ def test_half_a_sample_is_asked_where_fixes_or_accelerometers_resolve_it():
     assert _sampling_to_check(made(turn_deg_per_s=20.0, sensor="hg9900"))
     assert not _sampling_to_check(made(turn_deg_per_s=20.0))
     assert not _sampling_to_check(made(speed=80.0, sd=0.02, findings=()))
+
+
+def test_a_lever_arm_of_zero_is_listed_beside_fixes_that_are_finer_than_it():
+    assert "0.02 m" in _arm(made(sd=0.02).gnss)
+    assert not _arm(made(sd=5.0).gnss)
+    assert not _arm(None)
