@@ -17,6 +17,7 @@ from tests.studio.two_recorders import write_two_recorders
 import strapdown as sd
 from strapdown.crash.template import read_records
 from strapdown.errors import ConfigError, DataError
+from strapdown.formats import read_raw
 from strapdown.studio import forms
 from strapdown.studio.configuration import check, command, edited, propose
 from strapdown.studio.folder import Folder
@@ -772,6 +773,30 @@ def test_fixes_beside_the_recording_of_a_folder_come_along(folder):
     write_track(folder / "one" / "track.gpx")
     asked = look(folder, ["one"], {})["questions"]
     assert ("one/track.gpx", HEIGHTS) in {(q["file"], q["key"]) for q in asked}
+
+
+def test_files_of_samples_and_of_fixes_in_a_folder_are_used(folder):
+    """A folder of arrays, of the inertial sensors and of a receiver; one array is of neither."""
+    arrays = folder / "segment"
+    arrays.mkdir()
+    time = np.arange(0.0, 10.0, 0.01)
+    samples = {"gyro": np.zeros(3), "accelerometer": np.array([0.0, 0.0, 9.8])}
+    for kind, value in samples.items():
+        np.save(arrays / f"IMU__{kind}__t.npy", time)
+        np.save(arrays / f"IMU__{kind}__value.npy", np.tile(value, (time.size, 1)))
+    date = 1.5e9 * 1e3 + 100.0 * np.arange(100)
+    fixes = np.column_stack([np.full((100, 6), [48.0, 11.0, 0.0, date[0], 500.0, 0.0])])
+    fixes[:, 3] = date
+    np.save(arrays / "GNSS__live_gnss_ublox__t.npy", time[::10])
+    np.save(arrays / "GNSS__live_gnss_ublox__value.npy", fixes)
+    np.save(arrays / "CAN__speed__t.npy", time)
+    found = look(folder, ["segment"], {})
+    assert "imu" in {one["name"] for one in found["streams"]}
+    unused = [f["file"] for f in found["between"] if f["code"] == "studio.file-not-used"]
+    assert unused == ["segment/CAN__speed__t.npy"]
+    # The samples are sealed with what they were read from.
+    read = {path.name for path in read_raw(arrays).files}
+    assert {"IMU__gyro__value.npy", "IMU__accelerometer__value.npy"} <= read
 
 
 def test_files_of_a_folder_have_its_name_in_what_is_found(folder):

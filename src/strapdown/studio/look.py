@@ -212,7 +212,7 @@ def files_read(paths: Sequence[Path]) -> set[Path]:
 
 def _files_read(path: Path) -> list[Path]:
     """List the files that are read for a path, resolved; of a crash with those it names."""
-    from strapdown.formats import files_of
+    from strapdown.formats import files_of, read_raw, reader_of
     from strapdown.formats.crash_records import read_crash_record, stated_format
 
     own: Sequence[Path] = [path]
@@ -220,6 +220,11 @@ def _files_read(path: Path) -> list[Path]:
         with suppress(StrapdownError):
             of_crash = stated_format(path) is not None
             own = read_crash_record(path).files if of_crash else files_of(path)
+        if own == (path,) and reader_of(path)[1] is not None:
+            # A format whose reader lists no files is the whole folder.
+            own = sorted(file for file in path.rglob("*") if file.is_file())
+        with suppress(StrapdownError):
+            own = (*own, *read_raw(path).files)
     return [path.resolve(), *(file.resolve() for file in own)]
 
 
