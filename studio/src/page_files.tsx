@@ -20,7 +20,7 @@ export function FilesPage() {
   const input = useRef<HTMLInputElement>(null);
   // Under the same name there is something else now.
   const replaced = useRef(false);
-  const files = state?.files ?? [];
+  const files = (state?.files ?? []).filter((file) => file.recording !== false);
   const here = chosen.filter((name) => files.some((file) => file.name === name || file.inside?.includes(name)));
 
   const put = (name: string, part: Partial<Sending>) =>
@@ -123,7 +123,11 @@ export function FilesPage() {
             </More>}
           </Fragment>)}
         </fieldset>
-        {here.length > 0 && <p class="soft" role="status">Chosen: {here.join(", ")}. {here.length > 1 && <button type="button" onClick={() => setChosen([])}>Choose none</button>}</p>}
+        {files.length > 1 && <p class="row">
+          <button type="button" disabled={files.every((file) => here.includes(file.name))} onClick={() => setChosen(files.map((file) => file.name))}>Choose all</button>
+          <button type="button" disabled={!here.length} onClick={() => setChosen([])}>Choose none</button>
+        </p>}
+        {here.length > 0 && <p class="soft" role="status">Chosen: {here.join(", ")}.</p>}
         <div class="next"><button type="button" class="main" disabled={!here.length} onClick={go}>Look into {here.length ? plural(here.length, "file") : "them"}</button></div>
       </>}
     </Part>

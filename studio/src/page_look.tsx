@@ -235,8 +235,10 @@ const SHOWN = 6;
 /** Streams that belong together in time: those that overlap the first record. */
 function together(streams: Stream[]): Stream[] {
   const first = streams.find(ofCrash);
-  return first ? streams.filter((s) => (ofCrash(s) || s.name === "imu") && s.from_s < first.to_s && s.to_s > first.from_s) : [];
+  return first ? streams.filter((s) => drawnWithCrash(s) && s.from_s < first.to_s && s.to_s > first.from_s) : [];
 }
+
+const drawnWithCrash = (s: Stream) => ofCrash(s) || s.name === "imu";
 
 function Signals({ look, streams, imu, reading }: { look: Look; streams: Stream[]; imu: Stream; reading: Reading }) {
   const zero = zeroOf(look);
@@ -247,6 +249,7 @@ function Signals({ look, streams, imu, reading }: { look: Look; streams: Stream[
   const [label, setLabel] = useState("");
   const [picked, setPicked] = useState<string[] | null>(null);
   const shown = useMemo(() => name === ALL && crash.length ? crash : [streams.find((s) => keyOf(s) === name) ?? imu], [name, streams]);
+  const apart = name === ALL && crash.length ? streams.filter((s) => drawnWithCrash(s) && !crash.includes(s)) : [];
   const whole = useMemo<Span>(() => spanOf(shown), [shown]);
   const several = new Set(shown.map((s) => s.file)).size > 1;
   const all = useMemo(() => shown.flatMap((s) => panelsOf(s).map((p) => ({ ...p, source: keyOf(s), rests: s.rests ?? [], steady: s.steady ?? [], gaps: s.gaps ?? [], title: several && s.file ? `${p.title} (${s.file})` : p.title }))), [shown]);
@@ -272,6 +275,7 @@ function Signals({ look, streams, imu, reading }: { look: Look; streams: Stream[
     {all.length > SHOWN && <More title={`${panels.length} of ${plural(all.length, "group")} of channels are shown: choose`}><fieldset class="row pick"><legend>Show</legend>
       {all.map((p) => <label class="inline" key={p.title}><input type="checkbox" checked={chosen.includes(p.title)} onChange={(e) => setPicked(e.currentTarget.checked ? [...chosen, p.title] : chosen.filter((t) => t !== p.title))} />{p.title}</label>)}
     </fieldset></More>}
+    {apart.length > 0 && <p class="notice warn" role="note">Not drawn here, because the times on their clocks do not overlap with {crash[0]!.file ?? "the first record"}: {apart.map((s) => `${s.file ?? wordsOf(s)} (${stamp(s.from_s - zero, 10)} to ${stamp(s.to_s - zero, 10)} s)`).join(", ")}. Choose them above to see them alone.</p>}
     {shown.some(ofCrash) && <p class="soft">As the files state them: in SI where the unit is known, at the time of each file, not yet turned into the axes of the vehicle.</p>}
     <Traces panels={panels} whole={whole} zero={zero} askKey={JSON.stringify([reading, name])} cursor={cursor} onCursor={setCursor} ask={ask}
       trim={trims ? work.trim : null} marks={work.marks} {...(trims ? { onTrim: setTrim } : {})} onMark={(t) => addMark(t)} />

@@ -1,6 +1,6 @@
 // What the server of the studio answers: one interface for each table of its address book.
 
-export interface StoredFile { name: string; bytes: number; modified: number | string; folder?: boolean; /** Files of a folder, each of which may be the log. */ inside?: string[] }
+export interface StoredFile { name: string; bytes: number; modified: number | string; folder?: boolean; /** Files of a folder, each of which may be the log. */ inside?: string[]; /** False of what is no recording, such as a configuration. */ recording?: boolean }
 
 export interface Run {
   name: string; command: string; title: string; made: number | string; digest: string;
@@ -11,7 +11,7 @@ export interface Run {
 
 export type JobState = "waiting" | "running" | "done" | "failed" | "cancelled" | "lost";
 
-export interface Problem { code: string; text: string; remedy?: string | null }
+export interface Problem { code: string; text: string; remedy?: string | null; file?: string; row?: number }
 
 export interface Job {
   id: string; kind: string; name: string; state: JobState; stage: string | null; share: number | null;

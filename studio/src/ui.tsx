@@ -66,7 +66,7 @@ export function Trouble({ problem, retry, take }: { problem: Problem | null; ret
   useEffect(() => { if (take && problem) own.current?.focus(); }, [problem, take]);
   if (!problem) return null;
   return <div class="notice bad" role="alert" ref={own} tabIndex={-1}>
-    <p><strong>{sentence(problem.text)}</strong></p>
+    <p>{problem.file && <span class="soft">{problem.file}{problem.row ? `, row ${problem.row}` : ""}: </span>}<strong>{sentence(problem.text)}</strong></p>
     {problem.remedy && <p>{sentence(problem.remedy)}</p>}
     {retry && <p><button type="button" onClick={retry}>Try again</button></p>}
   </div>;

@@ -41,6 +41,14 @@ await run(async () => {
   done("a result of the sample");
 
   await page.getByRole("navigation").getByRole("link", { name: "Files" }).first().click();
+  // All of the folder by the keyboard, and no configuration among what can be ticked.
+  const ticks = page.getByRole("group", { name: "Choose those of one recording" });
+  await page.getByRole("button", { name: "Choose none" }).press("Enter");
+  assert.equal(await ticks.getByRole("checkbox", { checked: true }).count(), 0);
+  await page.getByRole("button", { name: "Choose all" }).press("Enter");
+  assert.equal(await ticks.getByRole("checkbox", { checked: false }).and(page.locator(".item input")).count(), 0);
+  assert.equal(await ticks.getByText("crash-case.toml").count(), 0);
+  done("all of the folder by the keyboard");
   await page.locator("input[type=file]").setInputFiles(files);
   await page.locator(".sending").waitFor({ state: "detached" });
   await click(/^Look into 2/);

@@ -11,11 +11,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.coded import coded
 from tests.studio.two_recorders import write_two_recorders
 
+import strapdown as sd
+from strapdown.crash.template import read_records
 from strapdown.errors import ConfigError, DataError
+from strapdown.formats import read_raw
 from strapdown.studio import forms
 from strapdown.studio.configuration import check, command, edited, propose
+from strapdown.studio.folder import Folder
 from strapdown.studio.forms import form_of, kinds, unit_of
 from strapdown.studio.kinds import KINDS
 from strapdown.studio.look import look, stream
@@ -47,8 +52,6 @@ def comments(text):
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A folder with a log of 100 Hz that turns and rests, in which the process is."""
-    from strapdown.studio.folder import Folder
-
     rng = np.random.default_rng(0)
     time = np.arange(0.0, 60.0, 0.01)
     rate = 0.3 * np.sin(0.5 * time) * (time > 20.0)
@@ -208,8 +211,8 @@ def test_the_level_of_heights_is_asked_and_taken(folder):
     assert HEIGHTS not in propose(folder, "attitude", ["log.csv"], {HEIGHTS: 0.0}, axes, {})["toml"]
 
 
-def test_the_level_of_heights_is_asked_of_fixes_that_are_read_for_it_alone(folder):
-    """A track whose heights are over the sea was refused, and could not be answered for."""
+def write_track(path):
+    """A track whose heights are over the sea."""
     points = "".join(
         f'<trkpt lat="{48.0 + 1e-5 * k:.6f}" lon="11.0"><ele>500</ele>'
         f"<time>2026-01-01T00:00:{k:02d}Z</time></trkpt>"
@@ -217,7 +220,12 @@ def test_the_level_of_heights_is_asked_of_fixes_that_are_read_for_it_alone(folde
     )
     head = '<gpx version="1.1" creator="x" xmlns="http://www.topografix.com/GPX/1/1">'
     text = f"{head}<trk><trkseg>{points}</trkseg></trk></gpx>"
-    (folder / "track.gpx").write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
+
+
+def test_the_level_of_heights_is_asked_of_fixes_that_are_read_for_it_alone(folder):
+    """A track whose heights are over the sea was refused, and could not be answered for."""
+    write_track(folder / "track.gpx")
     for names in (["track.gpx"], ["log.csv", "track.gpx"]):
         found = look(folder, names, {}, "forward-left-up")
         asked = [q for q in found["questions"] if not q.get("optional")]
@@ -391,14 +399,67 @@ V5|a title|an aim|03/OCT/2017|MGA|DTNH|BT17|NCA|VTB|CON|DRY|22|OTH|OTH|36|0|0|0|
 """
 
 
-def test_a_test_of_a_laboratory_is_a_record_with_the_files_that_it_names(folder):
-    """The folder of a test is no log; the channels of one clock are one stream."""
-    place = folder / "test"
-    place.mkdir()
+def write_nhtsa(place):
     (place / "v00042.EV5").write_text(NHTSA)
     for number, last in ((93, 4), (94, 4), (95, 2)):
         curve = "".join(f"{1e-4 * k:.6f}\t{k + 0.5}\n" for k in range(-2, last))
         (place / f"v00042.{number:03d}").write_text(curve)
+    return sorted(path.name for path in place.iterdir())
+
+
+def test_files_that_a_record_names_are_used(folder):
+    """Ticked or named one by one, channel files are part of the record whose header is there."""
+    (folder / "test").mkdir()
+    files = [f"test/{name}" for name in write_nhtsa(folder / "test")]
+    assert len(files) == 4
+    header = files[-1]
+    assert header == "test/v00042.EV5"
+    every, alone = look(folder, files, {}), look(folder, [header], {})
+    assert every == alone and not every["between"]
+    made, of_header = (propose(folder, "crash", n, {}, None, {}) for n in (files, [header]))
+    assert made["toml"] == of_header["toml"] and made["findings"] == of_header["findings"]
+    assert "v00042.093" not in made["toml"]
+    # The commands, too.
+    paths = [str(folder / name) for name in files]
+    assert [r.path.name for r in read_records(paths)] == ["v00042.EV5"]
+    examined = sd.doctor(paths)
+    assert [log.name for log in examined.logs] == ["v00042.EV5"] and not examined.between
+    # Without the header they are what they are.
+    (folder / header).unlink()
+    assert len(read_records(paths[:3])) == 3
+
+
+def test_what_is_no_recording_is_not_read_and_what_cannot_be_read_refuses_not_all(folder):
+    names = crash_files(folder)
+    (folder / "case.toml").write_text(TEXT, encoding="utf-8")
+    for name, schema in (("manifest", "bundle 2"), ("scenario", "crash scenario 1")):
+        said = json.dumps({"schema": f"strapdown {schema}", "a": [1, 2]}, indent=2)
+        (folder / f"{name}.json").write_text(said, encoding="utf-8")
+    (folder / "bad.csv").write_text("time_s,ax [g],ay [g]\n0,1,2\n1,2\n2,3,4\n")
+    none = ["case.toml", "manifest.json", "scenario.json"]
+    ticked = sorted([*names, *none, "bad.csv"])
+    found = look(folder, ticked, {})
+    assert {s["file"] for s in found["streams"]} == set(names)
+    unused = [f["file"] for f in found["between"] if f["code"] == "studio.file-not-used"]
+    assert unused == none
+    made, plain = (propose(folder, "crash", n, {}, None, {}) for n in (ticked, names))
+    assert made["toml"] == plain["toml"]
+    said = {f["file"]: f["code"] for f in made["findings"]}
+    assert said["bad.csv"] == "io.crash-row"
+    assert all(said[name] == "studio.file-not-used" for name in none)
+    # Where it is all that there is, it is refused by name.
+    with pytest.raises(DataError, check=coded("io.crash-row", file="bad.csv")):
+        propose(folder, "crash", ["bad.csv"], {}, None, {})
+    # A list to tick has them not.
+    listed = {one["name"]: one.get("recording", True) for one in Folder(folder).files()}
+    assert {name for name, is_one in listed.items() if not is_one} == set(none)
+
+
+def test_a_test_of_a_laboratory_is_a_record_with_the_files_that_it_names(folder):
+    """The folder of a test is no log; the channels of one clock are one stream."""
+    place = folder / "test"
+    place.mkdir()
+    write_nhtsa(place)
     found = look(folder, ["test"], {})
     (log,) = found["logs"]
     assert log["format"]["name"] == "nhtsa" and log["fit"]["crash"]["answer"] == "with limits"
@@ -689,6 +750,53 @@ def test_a_folder_with_one_recording_among_other_files_is_that_recording(folder)
     assert [f["file"] for f in found["between"]] == ["one/LICENSE"]
     made = propose(folder, "attitude", ["one"], {}, None, {})
     assert tomllib.loads(made["toml"])["log"]["path"] == "one/log.csv"
+
+
+def test_fixes_beside_the_recording_of_a_folder_come_along(folder):
+    """A folder gives what its log and its fixes give that are ticked one by one."""
+    (folder / "one").mkdir()
+    shutil.copyfile(folder / "log.csv", folder / "one" / "log.csv")
+    (folder / "one" / "LICENSE").write_text("MIT\n")
+    (folder / "one" / "events.csv").write_text("time_s,event\n1.0,begin\n2.0,end\n")
+    rows = "".join(f"{k},{48.0 + 1e-5 * k},11.0,500.0\n" for k in range(60))
+    (folder / "one" / "fixes.csv").write_text("time_s,lat_deg,lon_deg,height_m\n" + rows)
+    by_folder, files = look(folder, ["one"], {}), ["one/log.csv", "one/fixes.csv"]
+    assert by_folder["streams"] == look(folder, files, {})["streams"]
+    assert ("one/fixes.csv", "gnss") in {(s["file"], s["name"]) for s in by_folder["streams"]}
+    unused = ["one/LICENSE", "one/events.csv"]
+    assert [f["file"] for f in by_folder["between"] if "not-used" in f["code"]] == unused
+    made, one_by_one = (propose(folder, "navigate", n, {}, None, {}) for n in (["one"], files))
+    assert made["toml"] == one_by_one["toml"] and '"one/fixes.csv"' in made["toml"]
+    assert [f["file"] for f in made["findings"] if "not-used" in f["code"]] == unused
+    # Heights whose level only a person knows are asked about, of a folder, too.
+    (folder / "one" / "fixes.csv").unlink()
+    write_track(folder / "one" / "track.gpx")
+    asked = look(folder, ["one"], {})["questions"]
+    assert ("one/track.gpx", HEIGHTS) in {(q["file"], q["key"]) for q in asked}
+
+
+def test_files_of_samples_and_of_fixes_in_a_folder_are_used(folder):
+    """A folder of arrays, of the inertial sensors and of a receiver; one array is of neither."""
+    arrays = folder / "segment"
+    arrays.mkdir()
+    time = np.arange(0.0, 10.0, 0.01)
+    samples = {"gyro": np.zeros(3), "accelerometer": np.array([0.0, 0.0, 9.8])}
+    for kind, value in samples.items():
+        np.save(arrays / f"IMU__{kind}__t.npy", time)
+        np.save(arrays / f"IMU__{kind}__value.npy", np.tile(value, (time.size, 1)))
+    date = 1.5e9 * 1e3 + 100.0 * np.arange(100)
+    fixes = np.column_stack([np.full((100, 6), [48.0, 11.0, 0.0, date[0], 500.0, 0.0])])
+    fixes[:, 3] = date
+    np.save(arrays / "GNSS__live_gnss_ublox__t.npy", time[::10])
+    np.save(arrays / "GNSS__live_gnss_ublox__value.npy", fixes)
+    np.save(arrays / "CAN__speed__t.npy", time)
+    found = look(folder, ["segment"], {})
+    assert "imu" in {one["name"] for one in found["streams"]}
+    unused = [f["file"] for f in found["between"] if f["code"] == "studio.file-not-used"]
+    assert unused == ["segment/CAN__speed__t.npy"]
+    # The samples are sealed with what they were read from.
+    read = {path.name for path in read_raw(arrays).files}
+    assert {"IMU__gyro__value.npy", "IMU__accelerometer__value.npy"} <= read
 
 
 def test_files_of_a_folder_have_its_name_in_what_is_found(folder):

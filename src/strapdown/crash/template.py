@@ -53,7 +53,7 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.aid_table import read_aid_table
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.crash_record import CrashRecord, compact
-from strapdown.formats.crash_records import read_crash_record
+from strapdown.formats.crash_records import files_named, read_crash_record
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.triad_units import axes_matrix, mirrored
 from strapdown.rotation import within_half_turn
@@ -84,10 +84,16 @@ class Draft:
 
 
 def read_records(paths: Sequence[str | Path]) -> list[CrashRecord]:
-    """Read the records for a proposed case. `ConfigError`: a file is named twice."""
+    """Read the records for a proposed case. `ConfigError`: a file is named twice.
+
+    A file that another record names as its own is part of that record.
+    """
     seen: dict[Path, str] = {}
     records = []
+    named = files_named([Path(given) for given in paths])
     for given in paths:
+        if named and Path(given).resolve() in named:
+            continue
         record = read_crash_record(given)
         own = {file.resolve(): file for file in record.files or (Path(given),)}
         for real in seen.keys() & own.keys():

@@ -402,7 +402,9 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
             try:
                 raw = reader.streams[key](path, *([part or None] if reader.parts else []))
                 if isinstance(raw, RawLog) and reader.files is not None:
-                    raw.files = reader.files(path) or raw.files
+                    # Of a folder, with those of the stream itself.
+                    own = tuple(file for file in raw.files if file.is_file())
+                    raw.files = tuple(dict.fromkeys((*reader.files(path), *own))) or raw.files
                 if isinstance(raw, RawLog) and key == TABLE and stream == "imu":
                     raw = of_one_sensor(raw)
                 return raw

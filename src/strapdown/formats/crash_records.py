@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from itertools import islice
 from pathlib import Path
 
-from strapdown.errors import ConfigError, DataError, check_choice
+from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
 from strapdown.formats import crash_edr, crash_json
 from strapdown.formats.crash_record import CrashRecord, clean
 from strapdown.formats.crash_table import record_of
 from strapdown.formats.signs import Signs
 
-__all__ = ["CRASH_READERS", "CrashReader", "detect", "read", "read_crash_record", "stated_format"]
+__all__ = [
+    "CRASH_READERS",
+    "CrashReader",
+    "detect",
+    "files_named",
+    "read",
+    "read_crash_record",
+    "stated_format",
+]
 
 
 # Logs of inertial sensors as crash records: arrays, phones, MATLAB, HDF5.
@@ -142,6 +151,25 @@ def stated_format(path: Path) -> str | None:
     """
     found = (name for name in _STATED if path.exists() and CRASH_READERS[name].detect(path))
     return next(found, None)
+
+
+#: Formats of several files, of which one names the others.
+_OF_SEVERAL = ("nhtsa", "mme")
+
+
+def files_named(paths: Sequence[Path]) -> set[Path]:
+    """Return the files that the records among paths name as their own, resolved.
+
+    A record of several files, such as a header with a file for each channel, is one: its other
+    files are part of it, and no records. What states itself a record is not among them.
+    """
+    named: set[Path] = set()
+    for path in paths:
+        # What cannot be read says so where it is read.
+        with suppress(StrapdownError, OSError, ValueError, RuntimeError):
+            if stated_format(path) in _OF_SEVERAL:
+                named |= {file.resolve() for file in read_crash_record(path).files}
+    return {file for file in named if stated_format(file) not in _OF_SEVERAL}
 
 
 def read_crash_record(

@@ -8,6 +8,7 @@ What the studio keeps for itself is in `STATE`, which is never listed and never 
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import tempfile
 import unicodedata
@@ -21,7 +22,7 @@ from typing import Any
 from strapdown.bundle import MANIFEST
 from strapdown.errors import ConfigError, DataError, printable
 
-__all__ = ["STATE", "Folder", "Limits", "plain_name"]
+__all__ = ["STATE", "Folder", "Limits", "is_recording", "plain_name"]
 
 #: Folder of the studio's own: jobs and what was computed of logs.
 STATE = ".strapdown-studio"
@@ -33,6 +34,8 @@ MOST_INSIDE = 500
 _MARKS = frozenset('/\\:*?"<>|')
 #: Files by which a folder is a session of a live run.
 _OF_SESSION = ("journal", "run.json")
+#: How the JSON of a result begins, such as a manifest; bytes that are searched for it.
+_OF_RESULT, _HEAD = re.compile(rb'\A\s*\{\s*"schema":\s*"strapdown '), 200
 #: Names that Windows gives to devices.
 _DEVICES = frozenset(
     ("con", "prn", "aux", "nul", *(f"com{k}" for k in range(10)), *(f"lpt{k}" for k in range(10)))
@@ -89,6 +92,16 @@ def plain_name(name: object) -> str:
     if refused:
         raise ConfigError("studio.name-not-plain", given=str(name)[:80])
     return text
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a file or folder may be a recording: no configuration, and no part of a result."""
+    suffix = path.suffix.lower()
+    if suffix != ".json" or not path.is_file():
+        return suffix != ".toml" or path.is_dir()
+    with suppress(OSError), path.open("rb") as stream:
+        return _OF_RESULT.search(stream.read(_HEAD)) is None
+    return True
 
 
 @dataclass(frozen=True)
@@ -200,7 +213,8 @@ class Folder:
     def files(self) -> list[dict[str, Any]]:
         """List the files, and the folders that are no results: name, bytes, time of change in s.
 
-        A folder has ``inside``, the names of what is in it.
+        A folder has ``inside``, the names of the recordings in it; what is none itself has a false
+        ``recording``.
         """
         found: list[dict[str, Any]] = []
         for entry in self.entries():
@@ -215,17 +229,21 @@ class Folder:
                 size = _size(Path(entry.path)) if folder else about.st_size
                 one: dict[str, Any] = {"name": entry.name, "bytes": size}
                 one["modified"] = about.st_mtime
+                if not is_recording(Path(entry.path)):
+                    one["recording"] = False
                 if folder:
                     one |= {"folder": True, "inside": self._inside(Path(entry.path))}
                 found.append(one)
         return sorted(found, key=lambda one: str(one["name"]).lower())
 
     def _inside(self, folder: Path) -> list[str]:
-        """Names of the files in a folder, each of which may be a log of its own."""
+        """Names of what is in a folder and may be a log of its own."""
         found = []
         for path in islice(folder.iterdir(), MOST_ENTRIES):
             with suppress(OSError, ConfigError):
-                found.append(self.name_of(self.file(self.name_of(path))))
+                inside = self.file(self.name_of(path))
+                if is_recording(inside):
+                    found.append(self.name_of(inside))
         return sorted(found, key=str.lower)[:MOST_INSIDE]
 
     def _sessions(self, folder: Path) -> list[dict[str, Any]]:

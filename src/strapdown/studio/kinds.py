@@ -160,7 +160,7 @@ def _compared(kind: str, path: Path, columns: set[str], *, within: bool) -> bool
 
 def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
     """Return what each file is for, by what `look` found in it; a person may have said it."""
-    from strapdown.studio.look import files_of_recorders, look
+    from strapdown.studio.look import files_of_recorders, files_read, look, unused_files
 
     own = {path.as_posix(): path for path in files_of_recorders(paths)}
     found = look(Path.cwd(), list(own), keys, axes)
@@ -209,6 +209,7 @@ def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
         for name in own
         if name not in used and not (kind in COMPARED and name in other)
     ]
+    findings += unused_files(paths, files_read(list(own.values())))
     if kind in COMPARED:
         data = {"kind": KINDS[kind].title.lower()}
         findings += [
@@ -270,13 +271,22 @@ def _draft_crash(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
     from strapdown.studio.look import files_of_recorders, unused_files
 
     records: list[CrashRecord] = []
+    unread: list[DataError] = []
     seen: set[Path] = set()
     for path in files_of_recorders(paths):
         # A record of several files is one, whichever of them are chosen.
         if path.resolve() not in seen:
-            records.append(read_crash_record(path))
-            seen |= {file.resolve() for file in (*records[-1].files, path)}
-    unused = unused_files(paths, seen)
+            try:
+                record = read_crash_record(path)
+            except DataError as error:
+                unread.append(error)
+            else:
+                records.append(record)
+                seen |= {file.resolve() for file in record.files}
+            seen.add(path.resolve())
+    if unread and not records:
+        raise unread[0]
+    unused = (*(error.finding for error in unread), *unused_files(paths, seen))
     stated, beside = {}, []
     for record in records:
         own, own_axes = of_file(keys, axes, record.path.as_posix())

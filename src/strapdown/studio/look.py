@@ -27,11 +27,12 @@ from strapdown.config.logs import DoctorSpec, FixesTable, LogTable
 from strapdown.config.spec import specify
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
-from strapdown.studio.folder import Folder, plain_name
+from strapdown.studio.folder import Folder, is_recording, plain_name
 from strapdown.studio.pyramid import LIST, write_stream
 from strapdown.studio.questions import (
     FOOT,
     HEIGHTS,
+    HEIGHTS_OPEN,
     OF_FILES,
     ROLES,
     axes_question,
@@ -156,7 +157,7 @@ def look(
     ]
     found = {
         **said,
-        "read": sorted({str(file) for path in paths for file in _files_read(path)}),
+        "read": sorted(map(str, files_read(paths))),
         "said": [headline(one) for one in made.logs],
         "uses": [{use: one.answer(use) for use in uses(one)} for one in made.logs],
         "findings": [told(f) for one in made.logs for f in (*one.faults, *one.notes)],
@@ -179,8 +180,12 @@ MOST_UNUSED = 20
 
 
 def unused_files(paths: Sequence[Path], used: set[Path]) -> list[Finding]:
-    """Return findings for the files of folders that are not among those used, by resolved path."""
+    """Return findings for files that are not among those used, by resolved path.
+
+    Those of folders, and those that are no recordings.
+    """
     inside = [f for path in paths if path.is_dir() for f in sorted(path.iterdir()) if f.is_file()]
+    inside += [path for path in paths if not is_recording(path)]
     left = [f for f in inside if not f.name.startswith(".") and f.resolve() not in used]
     here = Path.cwd()
     return [
@@ -200,9 +205,14 @@ def _with_unused(found: Mapping[str, Any], chosen: Sequence[Path]) -> dict[str, 
     return {**shown, "between": [*shown["between"], *map(told, unused)]}
 
 
+def files_read(paths: Sequence[Path]) -> set[Path]:
+    """Return the files that are read for paths, resolved."""
+    return {file for path in paths for file in _files_read(path)}
+
+
 def _files_read(path: Path) -> list[Path]:
     """List the files that are read for a path, resolved; of a crash with those it names."""
-    from strapdown.formats import files_of
+    from strapdown.formats import files_of, read_raw, reader_of
     from strapdown.formats.crash_records import read_crash_record, stated_format
 
     own: Sequence[Path] = [path]
@@ -210,6 +220,11 @@ def _files_read(path: Path) -> list[Path]:
         with suppress(StrapdownError):
             of_crash = stated_format(path) is not None
             own = read_crash_record(path).files if of_crash else files_of(path)
+        if own == (path,) and reader_of(path)[1] is not None:
+            # A format whose reader lists no files is the whole folder.
+            own = sorted(file for file in path.rglob("*") if file.is_file())
+        with suppress(StrapdownError):
+            own = (*own, *read_raw(path).files)
     return [path.resolve(), *(file.resolve() for file in own)]
 
 
@@ -221,13 +236,15 @@ def files_of_recorders(paths: Sequence[Path]) -> list[Path]:
     """Return paths with the tables of a folder in its place, where they are of several recorders.
 
     A folder is one recorder, whose tables are joined, unless two of them have a gyro; in place of
-    one with a single recording among other files is that recording.
+    one with a single recording among other files are that recording, and its fixes and references.
+    Without what another path names as its own file, and what is no recording, unless it is all.
     """
-    return [
-        one
-        for path in paths
-        for one in (_recordings_in(path, _digest(path)) if path.is_dir() else [path])
-    ]
+    from strapdown.formats.crash_records import files_named
+
+    named = files_named(paths)
+    own = [p for p in paths if p.resolve() not in named and is_recording(p)] or paths
+    each = (_recordings_in(path, _digest(path)) if path.is_dir() else [path] for path in own)
+    return list(dict.fromkeys(one for found in each for one in found))
 
 
 @lru_cache(maxsize=256)
@@ -245,8 +262,28 @@ def _recordings_in(folder: Path, _: str) -> Sequence[Path]:
         if error.finding.code in SEVERAL:
             return _tables(folder)
         if error.finding.code == "io.folder-of-one-recording":
-            return [Path(str(error.finding.data["path"]))]
+            log = Path(str(error.finding.data["path"]))
+            beside = [p for p in _files_in(folder) if p.name != log.name and _aids(p)]
+            return [log, *beside]
     return [folder]
+
+
+def _aids(path: Path) -> bool:
+    """Whether a file has fixes, or a reference, that go with the samples of another."""
+    from strapdown.systems.doctor import run_doctor
+
+    try:
+        (one,) = run_doctor(_examined([path.as_posix()], {}, None)).logs
+    except StrapdownError as error:
+        # Fixes, of which only the level of their heights is open, are asked about.
+        return error.finding.code in HEIGHTS_OPEN
+    return not {"gnss", "reference"}.isdisjoint(one.streams)
+
+
+def _files_in(folder: Path) -> list[Path]:
+    """List the files of a folder that may be recordings, by name."""
+    inside = (p for p in sorted(folder.iterdir()) if p.is_file() and not p.name.startswith("."))
+    return [path for path in inside if is_recording(path)]
 
 
 def _tables(folder: Path) -> list[Path]:
@@ -254,11 +291,10 @@ def _tables(folder: Path) -> list[Path]:
     from strapdown.formats.crash_records import read_crash_record
 
     found = []
-    for path in sorted(folder.iterdir()):
-        if path.is_file() and not path.name.startswith("."):
-            with suppress(StrapdownError):
-                read_crash_record(path)
-                found.append(path)
+    for path in _files_in(folder):
+        with suppress(StrapdownError):
+            read_crash_record(path)
+            found.append(path)
     return found
 
 

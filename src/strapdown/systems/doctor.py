@@ -212,8 +212,16 @@ def run_doctor(spec: DoctorSpec, progress: Progress = silent) -> Diagnosis:
     """
     logs: list[LogDiagnosis] = []
     unread: list[DataError] = []
+    # A file that the record of a crash names as its own is examined with it.
+    named: set[Path] = set()
+    if len(spec.logs) > 1:
+        from strapdown.formats.crash_records import files_named
+
+        named = files_named([Path(log.path) for log in spec.logs])
     by_path = {fixes.path: fixes for fixes in spec.fixes}
     for k, log in enumerate(spec.logs):
+        if named and Path(log.path).resolve() in named:
+            continue
         progress(f"examining {Path(log.path).name}", 0.05 + 0.7 * k / len(spec.logs))
         try:
             logs.append(_diagnose(log, spec.axes_of(k), by_path.get(log.path)))
