@@ -121,6 +121,8 @@ export interface KeyNumber {
   group: string; label: string; value: string; bound: string; unit: string;
   /** Of a latitude or a longitude the bound is along the ground. */
   bound_unit: string;
+  /** What the bound leaves out or rests on, or how the value was judged. */
+  note?: string;
 }
 
 /** An option of a result; `usual`: it is as by default. */
@@ -135,6 +137,8 @@ export interface RunDetail extends Run {
   over_ground?: boolean;
   command_line: string; answer?: string | null; job?: string | null;
   numbers: KeyNumber[]; options: Option[]; inputs: Input[]; findings: Finding[];
+  /** What the heading integrity says, where the heading was not trusted throughout. */
+  heading?: string | null;
   /** Reasons against the result, those of its verdict. */
   against?: Finding[];
   from_s?: number; to_s?: number;

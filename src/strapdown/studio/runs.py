@@ -35,6 +35,7 @@ from strapdown.bundle import (
     sha256,
 )
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
+from strapdown.navigation.heading_integrity import STATUSES
 from strapdown.studio.folder import Folder
 from strapdown.studio.kinds import KINDS
 from strapdown.studio.look import kept_stream
@@ -165,6 +166,7 @@ def run(folder: Path, name: str) -> dict[str, Any]:
             for one in manifest["inputs"]
         ],
         # Without a heading the path of a crash is along the axes of the vehicle at its entry.
+        "heading": _heading(sealed),
         "over_ground": manifest["command"] != "crash" or is_over_ground(answer),
         # Why the verdict is not the best one; a reason is noticed, too, and once.
         "against": against,
@@ -245,9 +247,27 @@ def _numbers(sealed: SealedRun) -> list[dict[str, Any]]:
                     "unit": said["unit"],
                     # A bound of a latitude or a longitude is along the ground.
                     "bound_unit": said["bound_unit"],
+                    "note": one.note,
                 }
             )
     return found[:MOST]
+
+
+def _heading(sealed: SealedRun) -> str | None:
+    """Return what the heading integrity says, of a navigation whose heading was not all trusted."""
+    from strapdown.report.verdict import heading_sentence
+
+    if sealed.command != "navigate":
+        return None
+    # What another program wrote may have another form: it is then not told.
+    with suppress(StrapdownError, KeyError, IndexError, TypeError, ValueError, AttributeError):
+        told = sealed.parts[0].json("verdict.json")["heading"]
+        shares = {status: float(told["share"][status]) for status in STATUSES}
+        if shares["trusted"] < 1.0:
+            last, check = told["spans"][-1], told["confirmed_by"] or ""
+            why_not = "; ".join(_finding(one)["text"] for one in told["why_not"])
+            return heading_sentence(shares, last["status"], last["reason"], check, why_not)
+    return None
 
 
 def options_table(sealed: SealedRun) -> list[dict[str, Any]]:
