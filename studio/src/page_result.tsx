@@ -47,8 +47,12 @@ function Result({ run }: { run: RunDetail }) {
       <iframe class="report" src={run.report} title="The report" sandbox="allow-scripts" referrerpolicy="no-referrer" loading="lazy" />
     </Part>}
     <Part title="Repeat it">
-      <p>This command gives the same result to the last bit:</p>
-      <Command text={run.command_line} />
+      <p>This repeats the run and compares every file with it, to the last bit:</p>
+      <Command text={run.verifying} />
+      {run.command_line && <>
+        <p>This makes it again, in a folder of its own. The data files are the same to the last bit; the seal is another where the name of the folder is in what it covers: in <code>manifest.json</code> and the report.</p>
+        <Command text={run.command_line} />
+      </>}
       <p class="soft">Made {date(run.made)}. Seal <code class="digest">{run.digest}</code></p>
       <More title={<>Options <span class="soft">{plural(run.options.filter((one) => !one.usual).length, "option")} set, {run.options.filter((one) => one.usual).length} as by default</span></>}><Options options={run.options} /></More>
       <More title={<>Inputs <span class="soft">{plural(run.inputs.length, "file")}</span></>}>

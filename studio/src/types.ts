@@ -135,7 +135,8 @@ export interface Input { role: string; name: string; kept: string | null; sha256
 export interface RunDetail extends Run {
   /** False where the path of a crash is along the axes of the vehicle at its entry. */
   over_ground?: boolean;
-  command_line: string; answer?: string | null; job?: string | null;
+  /** What repeats and compares; and what makes it again beside it, null where it was made with options. */
+  verifying: string; command_line: string | null; answer?: string | null; job?: string | null;
   numbers: KeyNumber[]; options: Option[]; inputs: Input[]; findings: Finding[];
   /** What the heading integrity says, where the heading was not trusted throughout. */
   heading?: string | null;

@@ -16,7 +16,7 @@ from urllib.parse import quote
 import numpy as np
 import pytest
 
-from strapdown.bundle import MANIFEST, input_files, sha256, write_bundle, write_json
+from strapdown.bundle import MANIFEST, UNSEALED, input_files, sha256, write_bundle, write_json
 from strapdown.errors import ConfigError, Finding
 from strapdown.studio import runs
 from strapdown.studio.folder import Folder
@@ -53,7 +53,19 @@ def same_by_both(studio, tmp_path, kind, name, toml, options=()):
     (listed,) = [r for r in studio.ask("GET", "api/state").json["runs"] if r["name"] == name]
     assert listed["digest"] == digest and listed["command"] == kind
     found = studio.ask("GET", f"api/runs/{quote(name)}").json
-    assert found["command_line"] == job["command"] and found["job"] == job["id"]
+    assert found["job"] == job["id"]
+    by_command_line(studio.folder, found["verifying"])
+    # As it is shown: into a folder that is not there, with the same data under another name.
+    by_command_line(studio.folder, found["command_line"])
+    again = studio.folder / f"{name}-again"
+    data = [p for p in (studio.folder / name).rglob("*.*") if p.suffix in (".csv", ".json")]
+    data = [p for p in data if p.name not in (MANIFEST, *UNSEALED)]
+    # An attitude without a report has no name of its folder in it.
+    assert data and (digest == sha256(again / MANIFEST)) == (kind == "attitude")
+    for path in data:
+        same = again / path.relative_to(studio.folder / name)
+        assert same.read_bytes() == path.read_bytes(), path.name
+    assert studio.ask("GET", f"api/runs/{quote(name)}").json["command_line"].count("-again-2") == 1
     return studio.folder / name
 
 

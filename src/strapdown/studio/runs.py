@@ -172,7 +172,8 @@ def run(folder: Path, name: str) -> dict[str, Any]:
         "against": against,
         "findings": [one for one in against if (one["code"], one["text"]) not in said] + noticed,
         "versions": manifest["versions"],
-        "command_line": _repeating(manifest, name),
+        "verifying": shlex.join(("strapdown", "verify", name)),
+        "command_line": _repeating(folder, manifest, name),
         "figures": _figures(place, manifest, name),
         "report": f"runs/{name}/report.html" if "report.html" in has else None,
         "has": {
@@ -365,13 +366,24 @@ def _configuration(manifest: Mapping[str, Any]) -> str | None:
     return None
 
 
-def _repeating(manifest: Mapping[str, Any], name: str) -> str:
-    """Return the command that repeats a result."""
+def _repeating(folder: Path, manifest: Mapping[str, Any], name: str) -> str | None:
+    """Return the command that makes a result again beside it; None: it was made with options."""
     file = _configuration(manifest)
     command = str(manifest["command"])
     if file is None or command not in ("navigate", "align", "crash"):
-        return shlex.join(("strapdown", "verify", name))
-    return shlex.join(("strapdown", command, f"{name}/{file}", "--out", f"{name}-again"))
+        return None
+    made = shlex.join(("strapdown", command, f"{name}/{file}", "--out", name))
+    return repeating(folder, name, made)
+
+
+def repeating(folder: Path, name: str, made: str) -> str:
+    """Return the command that made a result with a folder that is not there as ``--out``."""
+    words = [word for word in shlex.split(made) if word != "--force"]
+    again, number = f"{name}-again", 2
+    while (folder / again).exists():
+        again, number = f"{name}-again-{number}", number + 1
+    words[words.index("--out") + 1] = again
+    return shlex.join(words)
 
 
 # --- series and track ---------------------------------------------------------------------
