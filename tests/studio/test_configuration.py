@@ -111,6 +111,22 @@ position_m = [1.0, 2.0, 3.0]  # found: the record says 'floor'; only you know: m
     assert edited(again, {"entry.speed_km_per_h": 60.0}) == again
 
 
+def test_a_measurement_of_a_simulated_case_is_no_longer_one_when_it_is_set_by_hand():
+    """Its remark says by what it was measured, which a slider is not."""
+    case = """[[units]]
+position_m = [0.60, -0.50, 0.20]  # yours: forward, right, down, with a tape measure
+angles_deg = [0.0, 0.0, 1.0]  # yours: roll, pitch, heading of the recorder against the vehicle
+"""
+    moved = {"units.0.position_m": [0.6, -0.4, 0.2], "units.0.angles_deg": [0.0, 0.0, 1.5]}
+    changed = edited(case, moved)
+    position, angles = changed.splitlines()[1:]
+    was = "set by hand; was [0.60, -0.50, 0.20], yours: forward, right, down, with a tape measure"
+    assert position == f"position_m = [0.6, -0.4, 0.2]  # {was}"
+    assert angles.startswith("angles_deg = [0.0, 0.0, 1.5]  # set by hand; was [0.0, 0.0, 1.0], ")
+    back = {"units.0.position_m": [0.6, -0.5, 0.2], "units.0.angles_deg": [0.0, 0.0, 1.0]}
+    assert edited(changed, back) == case
+
+
 def test_the_former_value_brings_the_former_line_back():
     there = {"entry.speed_km_per_h": 60, "units.0.levelling_deg": [1, 2], "units.0.angles_deg": [0]}
     back = {
