@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.studio.two_recorders import write_two_recorders
+from tests.unit.config.good_case import TEXT as CASE
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.studio import forms
@@ -125,6 +126,17 @@ angles_deg = [0.0, 0.0, 1.0]  # yours: roll, pitch, heading of the recorder agai
     assert angles.startswith("angles_deg = [0.0, 0.0, 1.5]  # set by hand; was [0.0, 0.0, 1.0], ")
     back = {"units.0.position_m": [0.6, -0.5, 0.2], "units.0.angles_deg": [0.0, 0.0, 1.0]}
     assert edited(changed, back) == case
+
+
+def test_a_position_outside_of_the_vehicle_is_refused_in_the_words_of_the_form(folder):
+    """By its own field and value and the size of the vehicle; no key that the form has not."""
+    for position, remedy in (([-1.2, 1.9, 0.1], "check this one"), ([600, -500, 200], "meters")):
+        errors = check(folder, "crash", CASE, {"units.1.position_m": position})["errors"]
+        (fault,) = [e for e in errors if e["code"] == "config.position-outside-vehicle"]
+        assert fault["path"] == "units.1.position_m" and fault["text"].startswith(str(position)[:5])
+        assert fault["text"].endswith("m long and 1.7 m wide"), fault["text"]
+        said = fault["text"] + fault["remedy"]
+        assert remedy in fault["remedy"] and "{" not in said and "_m" not in said
 
 
 def test_the_former_value_brings_the_former_line_back():
