@@ -32,7 +32,7 @@ function Result({ run }: { run: RunDetail }) {
     <Against reasons={run.against ?? []} heading={run.heading ?? null} />
     <Numbers numbers={run.numbers} />
     {(run.figures?.length ?? 0) > 0 && <div class="drawings">
-      {run.figures!.map((one) => <figure key={one.address}><a href={one.address} target="_blank" rel="noopener noreferrer" aria-label={`${one.title}, alone`}><img src={one.address} alt={one.alt} loading="lazy" /></a><figcaption>{one.title}</figcaption></figure>)}
+      {run.figures!.map((one) => <figure key={one.address} class={one.width > 1.5 * one.height ? "broad" : ""}><a href={one.address} target="_blank" rel="noopener noreferrer" aria-label={`${one.title}, alone`}><img src={one.address} alt={one.alt} width={one.width} height={one.height} loading="lazy" /></a><figcaption>{one.title}</figcaption></figure>)}
     </div>}
     <div class="row exports" role="group" aria-label="Take it with you">
       {exports.filter(([, , has]) => has).map(([as, words]) => <a class="button" key={as} href={api.exportOf(run.name, as)} download>{words}</a>)}

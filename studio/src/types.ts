@@ -98,6 +98,8 @@ export interface Proposal {
   choose?: Question[];
   /** Configurations in the folder that read these files. */
   ready?: { name: string; title: string; what: string; toml: string }[];
+  /** The file of the folder that is used in place of the proposal; nothing was then found or asked. */
+  from?: string;
   /** Whether tables apply that are comments of the text. */
   offers?: Question[];
   /** Questions whose answers are keys of [log], for another proposal. */
@@ -145,7 +147,7 @@ export interface RunDetail extends Run {
   from_s?: number; to_s?: number;
   panels?: { title: string; unit: string; columns: { name: string; label: string }[] }[];
   /** Drawings of the report of a crash. */
-  figures?: { title: string; address: string; alt: string }[];
+  figures?: { title: string; address: string; alt: string; width: number; height: number }[];
   report: string | null; has: { track?: boolean; attitude?: boolean; series?: boolean; pdf?: boolean; toml?: boolean };
 }
 

@@ -426,13 +426,16 @@ def test_the_drawings_of_a_crash_are_those_of_its_report(tmp_path):
         write_json(staging / "crash.json", answer)
         (staging / "figures").mkdir()
         for name in ("pdof", "severity", "units"):
-            text = f"<svg><title>{name}: 1 &lt; 2</title></svg>"
+            size = 'width="330" height="434.5" ' if name == "pdof" else ""
+            text = f"<svg {size}role='img'><title>{name}: 1 &lt; 2</title></svg>"
             (staging / "figures" / f"{name}.svg").write_text(text, encoding="utf-8")
     (place / "figures" / "path.svg").write_text("<svg></svg>", encoding="utf-8")
     found = runs.run(tmp_path, place.name)
     assert [(one["address"], one["alt"]) for one in found["figures"]] == [
         (f"runs/a%20crash/figures/{name}.svg", f"{name}: 1 < 2") for name in ("pdof", "severity")
     ]
+    sizes = [(one["width"], one["height"]) for one in found["figures"]]
+    assert sizes == [(330.0, 434.5), (400.0, 300.0)]
     (crush,) = [one for one in found["numbers"] if one["group"] == "Deformation"]
     said = " ".join((crush["label"], crush["value"], crush["bound"], crush["unit"]))
     assert said == "crush 0.50 +∞ \N{MINUS SIGN}0.10 m"

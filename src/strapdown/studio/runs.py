@@ -193,23 +193,29 @@ DRAWINGS = {
     "measuring-points": "Change of velocity at the measuring points",
     "severity": "Severity",
 }
+#: Size of a drawing, at its beginning.
+SIZE = re.compile(rb'<svg [^>]*?width="(\d{1,6}(?:\.\d{1,6})?)" height="(\d{1,6}(?:\.\d{1,6})?)"')
 #: Title of a drawing, which says in words what it shows.
 TITLE = re.compile(rb"<title>([^<]{1,2000})</title>")
 
 
-def _figures(place: Path, manifest: Mapping[str, Any], name: str) -> list[dict[str, str]]:
+def _figures(place: Path, manifest: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
     """List the drawings of the report of a crash that are shown beside its numbers.
 
-    Each has its ``title``, its ``address``, and ``alt``: what it shows, in words.
+    Each has its ``title``, its ``address``, ``alt``: what it shows, in words, and ``width`` and
+    ``height``, which a page keeps free for it.
     """
     found = []
     for slug, title in DRAWINGS.items() if manifest["command"] == "crash" else ():
         with suppress(ConfigError, OSError):
             file = f"figures/{slug}.svg"
             with file_in(place, file, manifest).open("rb") as drawn:
-                said = TITLE.search(drawn.read(8192))
+                head = drawn.read(8192)
+            said, size = TITLE.search(head), SIZE.search(head)
+            width, height = (400.0, 300.0) if size is None else map(float, size.groups())
             alt = title if said is None else html.unescape(said[1].decode(errors="replace"))
-            found.append({"title": title, "address": f"runs/{quote(name)}/{file}", "alt": alt})
+            one = {"title": title, "address": f"runs/{quote(name)}/{file}", "alt": alt}
+            found.append({**one, "width": width, "height": height})
     return found
 
 
