@@ -187,7 +187,7 @@ export interface Comparison {
   inputs: { role: string; same: boolean; status: string[]; files: ({ name: string } | null)[] }[];
   conditions: { name: string; values: (string | null)[] }[];
   numbers: {
-    group: string; quantity: string; same: boolean; detail: boolean; within: (boolean | null)[];
+    group: string; quantity: string; same: boolean; detail: boolean; /** It differs, by less than is shown. */ finer: boolean; within: (boolean | null)[];
     /** As the reports show them; differences from the first run, with the bound of each. */
     shown: { unit: string; bound_unit: string; values: string[]; bounds: string[]; differences: string[]; combined: string[] };
   }[];

@@ -650,7 +650,7 @@ def compare(folder: Path, runs: Sequence[str]) -> dict[str, Any]:
     """Compare results: the JSON of ``strapdown compare``, and the address of its page."""
     from strapdown.api.compare import compare_runs
     from strapdown.report.compare import comparison_json
-    from strapdown.report.compare_document import shown_row
+    from strapdown.report.compare_document import is_finer, shown_row
 
     place = Folder(folder)
     digests = [sha256(place.file(name) / MANIFEST) for name in runs]
@@ -666,6 +666,7 @@ def compare(folder: Path, runs: Sequence[str]) -> dict[str, Any]:
     told = comparison_json(found)
     for row, one in zip(told["numbers"], found.numbers, strict=True):
         row |= {"shown": shown_row(one, found.units), "detail": one.any.detail}
+        row["finer"] = is_finer(one, found.units)
     other = {row.key for row in found.options}
     return {
         **told,
