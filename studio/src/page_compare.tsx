@@ -49,7 +49,7 @@ const FEW = 8;
 /** What differs first: numbers with bounds, then options; what is the same is folded. */
 function Found({ found }: { found: Comparison }) {
   const names = found.runs.map((run) => run.name), others = names.slice(1);
-  const differ = found.numbers.filter((row) => !row.same);
+  const differ = found.numbers.filter((row) => !row.same && !row.finer), finer = found.numbers.filter((row) => row.finer);
   const main = differ.filter((row) => row.shown.bounds.some(Boolean) && !row.detail);
   const rest = differ.filter((row) => !main.includes(row)), same = found.numbers.filter((row) => row.same);
   const findings = found.findings_of_runs.filter((one) => one.differs);
@@ -69,10 +69,11 @@ function Found({ found }: { found: Comparison }) {
     <p class="lead" role="status">{found.summary}</p>
     <Findings findings={found.findings} />
     <Part title="Numbers that differ">
-      {!differ.length && <Empty>No number differs.</Empty>}
+      {!differ.length && <Empty>No number differs{finer.length ? " by as much as is shown" : ""}.</Empty>}
       {main.length > 0 && <p class="help">With 95 % bounds. A difference is a result minus {names[0]}. {boundWords(ofOneLog, others)}</p>}
       {numbers(main)}
       {rest.length > 0 && <More title={main.length ? plural(rest.length, "further number", "further numbers") : plural(rest.length, "number")} open={!main.length}>{numbers(rest)}</More>}
+      {finer.length > 0 && <More title={`${plural(finer.length, "number")} that ${finer.length === 1 ? "differs" : "differ"} by less than is shown`}>{numbers(finer)}</More>}
       {same.length > 0 && <More title={`${plural(same.length, "number")} that ${same.length === 1 ? "is" : "are"} the same`}>{numbers(same)}</More>}
     </Part>
     <Part title="Options that differ">

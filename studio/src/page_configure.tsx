@@ -50,12 +50,14 @@ export function ConfigurePage() {
   if (!work.kind || !work.files.length) {
     return <Page title="Nothing to set up yet"><Empty><a href={work.files.length ? "#/choose" : "#/files"}>{work.files.length ? "Choose what to find out" : "Choose a file"}</a> first.</Empty></Page>;
   }
-  return <Page title={kind?.title ?? "Set up"} lead="This was proposed from your log. Answer what is open, correct what is wrong, and run it.">
+  return <Page title={kind?.title ?? "Set up"} lead={work.proposal?.from ? `This is ${work.proposal.from} of the folder. Correct what is wrong, and run it.`
+    : `${work.proposal ? "This was proposed from your log. " : ""}Answer what is open, correct what is wrong, and run it.`}>
     {proposing && <Busy>Proposing a configuration from the log…</Busy>}
     <Trouble problem={problem} retry={() => void propose()} take={work.toml !== ""} />
     {problem && <p><a href="#/files">Choose other files</a>, <a href="#/look">look at how they are read</a>, or <a href="#/choose">find out something else</a>.</p>}
     <Trouble problem={kinds.problem} retry={kinds.again} />
     <Basis work={work} />
+    {work.proposal?.from && !proposing && <p class="row"><button type="button" onClick={() => void propose()}>Propose one from the log instead</button> <span class="soft">What is written here is replaced.</span></p>}
     {choose.length > 0 && <Part title={`${plural(choose.length, "question")} about the files`}>
       {choose.map((q, i) => <Ask key={q.key} take={i === 0} of={q.file} question={q} onAnswer={(set) => {
         const log = { ...work.log, ...set };
@@ -157,7 +159,7 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
 
   const run = async () => {
     setRefused(null);
-    if (reason) return setRefused({ code: "studio.not-ready", text: `It cannot run yet: ${reason}`, remedy: first ? null : "Write it above." });
+    if (reason) return setRefused({ code: "studio.not-ready", text: `It cannot run yet: ${reason}`, remedy: first || taken ? null : "Write it above." });
     if (checking) return setRefused({ code: "studio.not-ready", text: "It cannot run yet: the configuration is being checked", remedy: "Press again in a moment." });
     setStarting(true);
     try {
@@ -185,7 +187,7 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
   return <>
     {proposal?.ready?.filter((one) => one.toml !== work.toml).map((one) => <div class="notice ready" key={one.name}>
       <p><b>{one.name}</b> in the folder is a configuration for these files{one.title ? <>: {sentence(one.title)}</> : "."} {one.what}</p>
-      <p class="row"><button type="button" onClick={() => setWork({ toml: one.toml })}>Use {one.name}</button> <span class="soft">Nothing is open in it. What is proposed here is replaced.</span></p>
+      <p class="row"><button type="button" onClick={() => setWork({ toml: one.toml, proposal: { questions: [], findings: [], ready: proposal.ready!, from: one.name } })}>Use {one.name}</button> <span class="soft">Nothing is open in it. What is proposed here is replaced.</span></p>
     </div>)}
     <Questions questions={questions} values={values} onAnswer={set} />
     {offers.length > 0 && <Part title="Offered: add what is true">{offers.map((q) => <Ask key={q.key} question={q} onAnswer={set} />)}</Part>}
@@ -223,7 +225,7 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
       <label class="inline">Name of the result <input type="text" value={work.name} onInput={(e) => setWork({ name: e.currentTarget.value })} aria-describedby="taken" /></label>
       {taken && <label class="inline" id="taken"><input type="checkbox" checked={force === work.name} onChange={(e) => setForce(e.currentTarget.checked ? work.name : "")} /> Overwrite the result of this name</label>}
       <button type="button" class={reason ? "main notready" : "main"} disabled={starting} aria-describedby="reason" onClick={() => void run()}>Run it</button>
-      <span id="reason" class="soft">{starting ? "Starting…" : reason}</span>
+      <span id="reason" class={taken && reason ? "fault" : "soft"}>{starting ? "Starting…" : reason && sentence(reason)}</span>
     </div>
     <Trouble problem={refused} take />
     {refused && first && <p class="row"><button type="button" onClick={() => { const to = document.querySelector<HTMLElement>(first); to?.scrollIntoView({ block: "center" }); to?.focus(); }}>Go to the first</button></p>}

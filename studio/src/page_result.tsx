@@ -29,10 +29,10 @@ function Result({ run }: { run: RunDetail }) {
   ];
   return <>
     {run.verdict && VERDICTS[run.verdict] && <p class={`verdict ${VERDICTS[run.verdict]!.look}`}>{VERDICTS[run.verdict]!.words}</p>}
-    <Against reasons={run.against ?? []} />
+    <Against reasons={run.against ?? []} heading={run.heading ?? null} />
     <Numbers numbers={run.numbers} />
     {(run.figures?.length ?? 0) > 0 && <div class="drawings">
-      {run.figures!.map((one) => <figure key={one.address}><a href={one.address} target="_blank" rel="noopener noreferrer" aria-label={`${one.title}, alone`}><img src={one.address} alt={one.alt} loading="lazy" /></a><figcaption>{one.title}</figcaption></figure>)}
+      {run.figures!.map((one) => <figure key={one.address} class={one.width > 1.5 * one.height ? "broad" : ""}><a href={one.address} target="_blank" rel="noopener noreferrer" aria-label={`${one.title}, alone`}><img src={one.address} alt={one.alt} width={one.width} height={one.height} loading="lazy" /></a><figcaption>{one.title}</figcaption></figure>)}
     </div>}
     <div class="row exports" role="group" aria-label="Take it with you">
       {exports.filter(([, , has]) => has).map(([as, words]) => <a class="button" key={as} href={api.exportOf(run.name, as)} download>{words}</a>)}
@@ -47,8 +47,12 @@ function Result({ run }: { run: RunDetail }) {
       <iframe class="report" src={run.report} title="The report" sandbox="allow-scripts" referrerpolicy="no-referrer" loading="lazy" />
     </Part>}
     <Part title="Repeat it">
-      <p>This command gives the same result to the last bit:</p>
-      <Command text={run.command_line} />
+      <p>This repeats the run and compares every file with it, to the last bit:</p>
+      <Command text={run.verifying} />
+      {run.command_line && <>
+        <p>This makes it again, in a folder of its own. The data files are the same to the last bit; the seal is another where the name of the folder is in what it covers: in <code>manifest.json</code> and the report.</p>
+        <Command text={run.command_line} />
+      </>}
       <p class="soft">Made {date(run.made)}. Seal <code class="digest">{run.digest}</code></p>
       <More title={<>Options <span class="soft">{plural(run.options.filter((one) => !one.usual).length, "option")} set, {run.options.filter((one) => one.usual).length} as by default</span></>}><Options options={run.options} /></More>
       <More title={<>Inputs <span class="soft">{plural(run.inputs.length, "file")}</span></>}>
@@ -67,9 +71,10 @@ const VERDICTS: Record<string, { words: string; look: string }> = {
 const FEW = 3;
 
 /** Why a result is not trusted without reserve. */
-function Against({ reasons }: { reasons: Finding[] }) {
+function Against({ reasons: found, heading }: { reasons: Finding[]; heading: string | null }) {
+  const reasons = [...(heading ? [heading] : []), ...found.map((one) => sentence(one.text ?? one.code))];
   if (!reasons.length) return null;
-  const list = (some: Finding[]) => <ul class="plain">{some.map((one, i) => <li key={i}>{sentence(one.text ?? one.code)}</li>)}</ul>;
+  const list = (some: string[]) => <ul class="plain">{some.map((one, i) => <li key={i}>{one}</li>)}</ul>;
   return <div class="against" role="group" aria-label="Reasons against it">
     {list(reasons.slice(0, FEW))}
     {reasons.length > FEW && <More title={plural(reasons.length - FEW, "further reason")}>{list(reasons.slice(FEW))}</More>}
@@ -89,7 +94,10 @@ function said({ value, bound, unit, bound_unit }: KeyNumber): string {
 }
 
 /** What a name alone leaves open. */
-const MEANS: [RegExp, string][] = [[/^delta-V$/, "change of velocity in the impact, no speed of travel"], [/direction of force/, "0 is from ahead, clockwise"], [/^MAIS3\+/, "probability of a serious injury, by this model"], [/^crush$/, "by how much the reference point came nearer to the barrier"]];
+const MEANS: [RegExp, string][] = [[/^delta-V$/, "change of velocity in the impact, no speed of travel"], [/direction of force/, "0 is from ahead, clockwise"], [/^MAIS3\+/, "probability of a serious injury, by a published model"], [/^crush$/, "by how much the reference point came nearer to the barrier"]];
+
+/** The name of a number in large: of an injury without the source of its model, which is below. */
+const nameOf = ({ group, label }: KeyNumber) => group === "Severity" ? label.split(", ")[0]! : label;
 
 /** The numbers that matter first, large; all in a table. */
 function Numbers({ numbers: all }: { numbers: KeyNumber[] }) {
@@ -98,14 +106,16 @@ function Numbers({ numbers: all }: { numbers: KeyNumber[] }) {
   const large = main.length ? main : all.filter((one) => one.value && one.bound).slice(0, 4);
   return <>
     {large.length > 0 && <dl class="keys">
-      {large.map((one) => <div key={`${one.group} ${one.label}`}><dt>{[one.label.replace(/^./, (c) => c.toUpperCase()), one.group.toLowerCase() === "at the end" ? "at the end" : "", one.group.startsWith("Errors against") ? "against the reference" : ""].filter(Boolean).join(" ")}</dt>
+      {large.map((one) => <div key={`${one.group} ${one.label}`}><dt>{[nameOf(one).replace(/^./, (c) => c.toUpperCase()), one.group.toLowerCase() === "at the end" ? "at the end" : "", one.group.startsWith("Errors against") ? "against the reference" : ""].filter(Boolean).join(" ")}</dt>
         <dd>{one.value ? <>{one.value} <small>{one.bound} {one.bound ? one.bound_unit : one.unit}</small></> : said(one)}</dd>
-        {MEANS.filter(([pattern]) => pattern.test(one.label)).map(([, words]) => <dd class="means" key={words}>{words}</dd>)}</div>)}
+        {MEANS.filter(([pattern]) => pattern.test(one.label)).map(([, words]) => <dd class="means" key={words}>{words}</dd>)}
+        {nameOf(one) !== one.label && <dd class="means">{one.label.slice(nameOf(one).length + 2)}</dd>}
+        {one.note && <dd class="means">{one.note}</dd>}</div>)}
     </dl>}
     {large.some((one) => one.bound) && <p class="help">Bounds hold 95 % of the time.</p>}
     <More title={`All ${plural(all.length, "number")}`}>
       <div class="pairs">{[...new Set(all.map((one) => one.group))].map((group) => <Table key={group} caption={group || "Result"} head={["Quantity", "Value with 95 % bound"]} numeric={[1]}
-        rows={all.filter((one) => one.group === group).map((one) => [one.label, said(one)])} />)}</div>
+        rows={all.filter((one) => one.group === group).map((one) => [one.note ? <>{one.label} <span class="soft said">{one.note}</span></> : one.label, said(one)])} />)}</div>
     </More>
   </>;
 }

@@ -98,6 +98,8 @@ export interface Proposal {
   choose?: Question[];
   /** Configurations in the folder that read these files. */
   ready?: { name: string; title: string; what: string; toml: string }[];
+  /** The file of the folder that is used in place of the proposal; nothing was then found or asked. */
+  from?: string;
   /** Whether tables apply that are comments of the text. */
   offers?: Question[];
   /** Questions whose answers are keys of [log], for another proposal. */
@@ -121,6 +123,8 @@ export interface KeyNumber {
   group: string; label: string; value: string; bound: string; unit: string;
   /** Of a latitude or a longitude the bound is along the ground. */
   bound_unit: string;
+  /** What the bound leaves out or rests on, or how the value was judged. */
+  note?: string;
 }
 
 /** An option of a result; `usual`: it is as by default. */
@@ -133,14 +137,17 @@ export interface Input { role: string; name: string; kept: string | null; sha256
 export interface RunDetail extends Run {
   /** False where the path of a crash is along the axes of the vehicle at its entry. */
   over_ground?: boolean;
-  command_line: string; answer?: string | null; job?: string | null;
+  /** What repeats and compares; and what makes it again beside it, null where it was made with options. */
+  verifying: string; command_line: string | null; answer?: string | null; job?: string | null;
   numbers: KeyNumber[]; options: Option[]; inputs: Input[]; findings: Finding[];
+  /** What the heading integrity says, where the heading was not trusted throughout. */
+  heading?: string | null;
   /** Reasons against the result, those of its verdict. */
   against?: Finding[];
   from_s?: number; to_s?: number;
   panels?: { title: string; unit: string; columns: { name: string; label: string }[] }[];
   /** Drawings of the report of a crash. */
-  figures?: { title: string; address: string; alt: string }[];
+  figures?: { title: string; address: string; alt: string; width: number; height: number }[];
   report: string | null; has: { track?: boolean; attitude?: boolean; series?: boolean; pdf?: boolean; toml?: boolean };
 }
 
@@ -180,7 +187,7 @@ export interface Comparison {
   inputs: { role: string; same: boolean; status: string[]; files: ({ name: string } | null)[] }[];
   conditions: { name: string; values: (string | null)[] }[];
   numbers: {
-    group: string; quantity: string; same: boolean; detail: boolean; within: (boolean | null)[];
+    group: string; quantity: string; same: boolean; detail: boolean; /** It differs, by less than is shown. */ finer: boolean; within: (boolean | null)[];
     /** As the reports show them; differences from the first run, with the bound of each. */
     shown: { unit: string; bound_unit: string; values: string[]; bounds: string[]; differences: string[]; combined: string[] };
   }[];

@@ -26,6 +26,8 @@ await run(async () => {
   await click("Use crash-case.toml");
   await page.locator(".ask").first().waitFor({ state: "detached" });
   await see("in step with the form");
+  await see(/^This is crash-case\.toml of the folder\./);
+  assert.equal(await page.getByText("What was found while proposing it").count(), 0);
   await look("newcomer-0-used");
   await click("Run it");
   await page.getByRole("link", { name: "See the result" }).waitFor({ timeout: 600_000 });

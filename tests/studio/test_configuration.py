@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from tests.coded import coded
 from tests.studio.two_recorders import write_two_recorders
+from tests.unit.config.good_case import TEXT as CASE
 
 import strapdown as sd
 from strapdown.crash.template import read_records
@@ -112,6 +113,33 @@ position_m = [1.0, 2.0, 3.0]  # found: the record says 'floor'; only you know: m
     assert "= [9, 9, 9]  # set by hand; was [1.0, 2.0, 3.0], assumed: it looks ahead" in again
     # The same number without a point is no change.
     assert edited(again, {"entry.speed_km_per_h": 60.0}) == again
+
+
+def test_a_measurement_of_a_simulated_case_is_no_longer_one_when_it_is_set_by_hand():
+    """Its remark says by what it was measured, which a slider is not."""
+    case = """[[units]]
+position_m = [0.60, -0.50, 0.20]  # yours: forward, right, down, with a tape measure
+angles_deg = [0.0, 0.0, 1.0]  # yours: roll, pitch, heading of the recorder against the vehicle
+"""
+    moved = {"units.0.position_m": [0.6, -0.4, 0.2], "units.0.angles_deg": [0.0, 0.0, 1.5]}
+    changed = edited(case, moved)
+    position, angles = changed.splitlines()[1:]
+    was = "set by hand; was [0.60, -0.50, 0.20], yours: forward, right, down, with a tape measure"
+    assert position == f"position_m = [0.6, -0.4, 0.2]  # {was}"
+    assert angles.startswith("angles_deg = [0.0, 0.0, 1.5]  # set by hand; was [0.0, 0.0, 1.0], ")
+    back = {"units.0.position_m": [0.6, -0.5, 0.2], "units.0.angles_deg": [0.0, 0.0, 1.0]}
+    assert edited(changed, back) == case
+
+
+def test_a_position_outside_of_the_vehicle_is_refused_in_the_words_of_the_form(folder):
+    """By its own field and value and the size of the vehicle; no key that the form has not."""
+    for position, remedy in (([-1.2, 1.9, 0.1], "check this one"), ([600, -500, 200], "meters")):
+        errors = check(folder, "crash", CASE, {"units.1.position_m": position})["errors"]
+        (fault,) = [e for e in errors if e["code"] == "config.position-outside-vehicle"]
+        assert fault["path"] == "units.1.position_m" and fault["text"].startswith(str(position)[:5])
+        assert fault["text"].endswith("m long and 1.7 m wide"), fault["text"]
+        said = fault["text"] + fault["remedy"]
+        assert remedy in fault["remedy"] and "{" not in said and "_m" not in said
 
 
 def test_the_former_value_brings_the_former_line_back():

@@ -16,7 +16,7 @@ from urllib.parse import quote
 import numpy as np
 import pytest
 
-from strapdown.bundle import MANIFEST, input_files, sha256, write_bundle, write_json
+from strapdown.bundle import MANIFEST, UNSEALED, input_files, sha256, write_bundle, write_json
 from strapdown.errors import ConfigError, Finding
 from strapdown.studio import runs
 from strapdown.studio.folder import Folder
@@ -53,7 +53,19 @@ def same_by_both(studio, tmp_path, kind, name, toml, options=()):
     (listed,) = [r for r in studio.ask("GET", "api/state").json["runs"] if r["name"] == name]
     assert listed["digest"] == digest and listed["command"] == kind
     found = studio.ask("GET", f"api/runs/{quote(name)}").json
-    assert found["command_line"] == job["command"] and found["job"] == job["id"]
+    assert found["job"] == job["id"]
+    by_command_line(studio.folder, found["verifying"])
+    # As it is shown: into a folder that is not there, with the same data under another name.
+    by_command_line(studio.folder, found["command_line"])
+    again = studio.folder / f"{name}-again"
+    data = [p for p in (studio.folder / name).rglob("*.*") if p.suffix in (".csv", ".json")]
+    data = [p for p in data if p.name not in (MANIFEST, *UNSEALED)]
+    # An attitude without a report has no name of its folder in it.
+    assert data and (digest == sha256(again / MANIFEST)) == (kind == "attitude")
+    for path in data:
+        same = again / path.relative_to(studio.folder / name)
+        assert same.read_bytes() == path.read_bytes(), path.name
+    assert studio.ask("GET", f"api/runs/{quote(name)}").json["command_line"].count("-again-2") == 1
     return studio.folder / name
 
 
@@ -337,6 +349,74 @@ def test_the_reasons_against_a_result_stand_beside_its_verdict(tmp_path):
     assert "--" not in found["against"][1]["remedy"]
 
 
+def test_the_status_of_a_heading_stands_beside_its_value_and_the_verdict(tmp_path):
+    """As the run says it, from the values of its heading integrity."""
+    whole = {"name": "a", "navigation": {}}
+    span = {"from_s": 0.0, "to_s": 60.0, "status": "unverified", "reason": "assumed"}
+    heading = {"confirmed_by": None, "why_not": [], "at_end": "unverified", "spans": [span]}
+    end = {"time_s": 60.0, "heading_deg": 3.1, "heading_sd_deg": 0.6}
+
+    def made(name, trusted):
+        share = {"trusted": trusted, "unverified": 1.0 - trusted, "rejected": 0.0}
+        with write_bundle(
+            tmp_path / name, command="navigate", configuration=whole, inputs=(), seals=[]
+        ) as staging:
+            write_json(staging / "navigation.json", {"end": end})
+            write_json(staging / "verdict.json", {"heading": heading | {"share": share}})
+        found = runs.run(tmp_path, name)
+        (one,) = [n for n in found["numbers"] if (n["group"], n["label"]) == HEADING_AT_END]
+        return found["heading"], one["note"].replace("\u00a0", " ")
+
+    said, note = made("a", 0.0)
+    assert said.replace("\u00a0", " ") == (
+        "Heading: unverified 100 % of the time; final status: unverified (its own bound is small, "
+        "but rests on the start or on one measurement only)."
+    )
+    assert note == "unverified 100 % of the time; final status: unverified"
+    said, note = made("b", 0.25)
+    assert "trusted 25.0 %, unverified 75.0 % of the time" in said.replace("\u00a0", " ")
+    # A heading that was trusted throughout needs no caution.
+    assert made("c", 1.0)[0] is None
+    # A result that was written by hand.
+    heading["spans"] = [{"status": 3}]
+    assert made("d", 0.0)[0] is None
+
+
+HEADING_AT_END = ("At the end", "heading")
+
+
+def test_what_the_bounds_of_a_crash_rest_on_is_beside_them(tmp_path):
+    force = {"horizontal_deg": 0.0, "low_deg": 357.0, "high_deg": 3.0, "undetermined": False}
+    speed = {"value": 17.0, "low": 16.0, "high": 18.0}
+    body = {"event": {"resultant_m_per_s": speed, "direction_of_force": force}}
+    events = [{"event": k, "body": body} for k in (1, 2)]
+    risk = {"model": "own_identifier", "outcome": "MAIS3+", "source": "Author (2001): title, 2-1"}
+    risk |= {"of": "R", "probability": 0.4, "low": 0.3, "high": 0.5}
+    answer = {
+        "main": "R",
+        "answers": [{"recorder": "R", "main_event": 2, "events": events}],
+        "on_assumption": ["direction of force", "position forward"],
+        "severity": [
+            risk | {"model_uncertainty_in_bound": False},
+            risk | {"outcome": "MAIS2+", "model_uncertainty_in_bound": True},
+        ],
+    }
+    whole = {"command": "crash", "configuration": {}, "inputs": (), "seals": []}
+    with write_bundle(tmp_path / "a", **whole) as staging:
+        write_json(staging / "crash.json", answer)
+    found = {(n["group"], n["label"]): n["note"] for n in runs.run(tmp_path, "a")["numbers"]}
+    direction = "direction of force (PDOF)"
+    assert found["Impact 2", direction] == "by assumption"
+    assert found["Impact 1", direction] == found["Impact 2", "delta-V"] == ""
+    of_model = "Author (2001): title, 2-1"
+    assert (
+        found["Severity", f"MAIS3+, {of_model}"]
+        == "the bound leaves the uncertainty of the model out"
+    )
+    assert found["Severity", f"MAIS2+, {of_model}"] == ""
+    assert "own_identifier" not in str(found)
+
+
 def test_the_drawings_of_a_crash_are_those_of_its_report(tmp_path):
     """Each with what it shows in words; one that the seal does not list is none."""
     place = tmp_path / "a crash"
@@ -346,13 +426,16 @@ def test_the_drawings_of_a_crash_are_those_of_its_report(tmp_path):
         write_json(staging / "crash.json", answer)
         (staging / "figures").mkdir()
         for name in ("pdof", "severity", "units"):
-            text = f"<svg><title>{name}: 1 &lt; 2</title></svg>"
+            size = 'width="330" height="434.5" ' if name == "pdof" else ""
+            text = f"<svg {size}role='img'><title>{name}: 1 &lt; 2</title></svg>"
             (staging / "figures" / f"{name}.svg").write_text(text, encoding="utf-8")
     (place / "figures" / "path.svg").write_text("<svg></svg>", encoding="utf-8")
     found = runs.run(tmp_path, place.name)
     assert [(one["address"], one["alt"]) for one in found["figures"]] == [
         (f"runs/a%20crash/figures/{name}.svg", f"{name}: 1 < 2") for name in ("pdof", "severity")
     ]
+    sizes = [(one["width"], one["height"]) for one in found["figures"]]
+    assert sizes == [(330.0, 434.5), (400.0, 300.0)]
     (crush,) = [one for one in found["numbers"] if one["group"] == "Deformation"]
     said = " ".join((crush["label"], crush["value"], crush["bound"], crush["unit"]))
     assert said == "crush 0.50 +∞ \N{MINUS SIGN}0.10 m"

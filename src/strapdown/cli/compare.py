@@ -100,8 +100,7 @@ def _print(result: RunComparison, *, verbose: bool) -> None:
         if block.caption:
             out.print(spaced(block.caption), style="dim")
     if not verbose:
-        hidden = sum(row.any.detail and not row.same for row in result.numbers)
-        if hidden:
+        if hidden := page.hidden_numbers(result):
             out.print(f"{hidden} further numbers differ: --verbose, or the page of --out.")
         if said := page.total_words(result):
             out.print(spaced(said))

@@ -116,6 +116,8 @@ def _positions(spec: CaseSpec) -> Iterator[Fault]:
         front = length
     sides = [(front, -half), (front, half), (back, half), (back, -half)]
     corners = list(vehicle.outline_m) or sides
+    if vehicle.outline_m:
+        length, width = (max(along) - min(along) for along in zip(*corners, strict=True))
     for path, place in places:
         if place is None:
             continue
@@ -132,9 +134,9 @@ def _positions(spec: CaseSpec) -> Iterator[Fault]:
         if keys:
             hint = Finding("config.position-in-other-unit", keys=keys)
         if beside > BEYOND:
-            size = At(("vehicle",), f"{length:g} m by {width:g} m")
-            data = {"distance": beside, "vehicle": size, "hint": hint}
-            yield fault(path, "config.position-outside-vehicle", **data)
+            stated = At(("vehicle",), f"{length:g} m by {width:g} m")
+            data = {"distance": beside, "length": length, "width": width, "hint": hint}
+            yield fault(path, "config.position-outside-vehicle", **data, vehicle=stated)
         elif down > HIGHEST:
             side = "below" if place[2] > 0 else "above"
             yield fault(path, f"config.position-{side}-origin", distance=down, hint=hint)

@@ -84,16 +84,7 @@ def headline(result: RunComparison) -> str:
         )
     said.append(_inputs_words(result))
     if result.same_command and result.numbers:
-        other = sum(not row.same for row in result.numbers)
-        outside = sum(False in row.within for row in result.numbers)
-        words = (
-            "No number differs."
-            if not other
-            else f"{other} of {len(result.numbers)} numbers {'differs' if other == 1 else 'differ'}"
-        )
-        if other:
-            words += f", {outside} by more than their 95 % bound." if outside else "."
-        said.append(words)
+        said.append(_numbers_words(result))
     for one in result.differences:
         if (score := one.score("horizontal")) is not None:
             of = f"{runs[one.run].name}: " if len(runs) > 2 else ""
@@ -109,6 +100,20 @@ def headline(result: RunComparison) -> str:
                 f"{length_words(score.largest)} at most{within}."
             )
     return " ".join(said)
+
+
+def _numbers_words(result: RunComparison) -> str:
+    count = len(result.numbers)
+    finer = sum(is_finer(row, result.units) for row in result.numbers)
+    other = sum(not row.same for row in result.numbers) - finer
+    outside = sum(False in row.within for row in result.numbers)
+    if not other:
+        less = f" by as much as is shown; {finer} of {count} by less" if finer else ""
+        return f"No number differs{less}."
+    words = f"{other} of {count} numbers {'differs' if other == 1 else 'differ'}"
+    if outside:
+        words += f", {outside} by more than their 95 % bound"
+    return f"{words}; {finer} more by less than is shown." if finer else f"{words}."
 
 
 def _inputs_words(result: RunComparison) -> str:
@@ -249,8 +254,7 @@ def _options(result: RunComparison) -> Iterator[Block | None]:
 def _numbers(result: RunComparison) -> Iterator[Block | None]:
     block = numbers_block(result, short=True)
     yield block
-    hidden = sum(row.any.detail and not row.same for row in result.numbers)
-    if hidden:
+    if hidden := hidden_numbers(result):
         yield Paragraph(f"{hidden} further numbers that differ are below, under all.", "note")
     elif block is None:
         yield Paragraph("None.")
@@ -298,7 +302,7 @@ def numbers_block(
 ) -> TableBlock | None:
     """Return the numbers that differ, or all, under the names of their groups.
 
-    `short`: without details.
+    `short`: without details, and without those that differ by less than is shown.
     """
     rows: list[tuple[str, ...]] = []
     strong = []
@@ -309,7 +313,7 @@ def numbers_block(
         columns += ["difference", "95 % bound of it"][: 2 if bounded else 1]
     group = None
     for row in result.numbers:
-        if (row.same and not every) or (short and row.any.detail):
+        if (row.same and not every) or (short and _is_hidden(row, result)):
             continue
         if row.any.group != group:
             group = row.any.group
@@ -322,6 +326,24 @@ def numbers_block(
     if not two:
         caption = "In brackets: minus the first; ! outside the 95 % bound of the difference."
     return TableBlock(tuple(columns), tuple(rows), (0,), caption, tuple(strong))
+
+
+def hidden_numbers(result: RunComparison) -> int:
+    """Return how many numbers that differ a short list leaves out."""
+    return sum(not row.same and _is_hidden(row, result) for row in result.numbers)
+
+
+def _is_hidden(row: NumberRow, result: RunComparison) -> bool:
+    return row.any.detail or is_finer(row, result.units)
+
+
+def is_finer(row: NumberRow, system: str | None) -> bool:
+    """Whether a number differs, but by less than is shown of it, its bounds and its differences."""
+    if row.same or False in row.within:
+        return False
+    said = shown_row(row, system)
+    alike = all(len(set(said[key])) == 1 for key in ("values", "bounds"))
+    return alike and not any(one.strip(f"0.{MINUS}") for one in said["differences"] if one != SAME)
 
 
 def shown_row(row: NumberRow, system: str | None) -> dict[str, Any]:

@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from strapdown.constants import TWO_SIDED_95
+from strapdown.navigation.heading_integrity import STATUSES
 from strapdown.report.compare_folders import LONGEST, RunPart
 from strapdown.report.crash_case import in_si
-from strapdown.report.values import AXES
+from strapdown.report.values import AXES, shares_words
 from strapdown.tables import EULER, NED, VELOCITY
 from strapdown.units import SPEEDS
 
@@ -48,6 +49,8 @@ class Value:
         Instant that it belongs to, s: values of different instants have no difference.
     detail : bool
         Whether a short list leaves it out.
+    note : str
+        What its bound leaves out or rests on, or how it was judged; empty without a remark.
     """
 
     key: str
@@ -61,6 +64,7 @@ class Value:
     place: Place | None = field(default=None, repr=False)
     at: float | None = None
     detail: bool = False
+    note: str = ""
 
 
 def values_of(part: RunPart) -> Iterator[Value]:
@@ -154,8 +158,8 @@ def _navigate(part: RunPart) -> Iterator[Value]:
     data = part.answer
     integrity = part.json("verdict.json")
     yield from _row("answer.verdict", "Answer", "verdict", _word(data, "trust", "verdict"))
-    for key in ("trusted", "unverified", "rejected"):
-        share = _number(integrity, "heading", "share", key)
+    shares = {key: _number(integrity, "heading", "share", key) for key in STATUSES}
+    for key, share in shares.items():
         label = f"time with heading {key}"
         yield from _row(
             f"integrity.heading.{key}", "Integrity", label, _percent(share), "%", kind="share"
@@ -166,7 +170,10 @@ def _navigate(part: RunPart) -> Iterator[Value]:
         share = _percent(_number(one, "share", "trusted"))
         label = f"time with {name.replace('_', ' ')} trusted"
         yield from _row(f"integrity.{name}.trusted", "Integrity", label, share, "%", kind="share")
-    yield from _state(_table(data, "end"))
+    judged = shares_words({key: share for key, share in shares.items() if share is not None})
+    note = f"{judged} of the time; final status: {at_end}" if judged and at_end else ""
+    for number in _state(_table(data, "end")):
+        yield replace(number, note=note) if number.key == "end.heading_deg" else number
     largest = _number(integrity, "position", "largest_bound_95_m")
     label = "largest 95 % bound, horizontal"
     yield from _row("bounds.largest_horizontal_m", "Bounds", label, largest, "m")
@@ -434,6 +441,8 @@ def _crash(part: RunPart) -> Iterator[Value]:
     data = in_si(part.answer)
     main, answers = _word(data, "main"), _tables(data, "answers")
     agree = _word(data, "comparison", "agree")
+    found = _at(data, "on_assumption")
+    assumed = [w for w in BY_ASSUMPTION if isinstance(found, list) and w in found]
     yield from _row("answer.recorder", "Answer", "result by", main)
     yield from _row("answer.agree", "Answer", "recorders agree", agree)
     for answer in answers:
@@ -442,7 +451,11 @@ def _crash(part: RunPart) -> Iterator[Value]:
             for event in events:
                 number = f"{_number(event, 'event') or 0:g}"
                 group = f"Impact {number}" if len(events) > 1 else "Impact"
-                yield from _impact(event, f"main.event.{number}", group)
+                key = f"main.event.{number}"
+                is_main = _number(event, "event") == _number(answer, "main_event")
+                rests = {f"{key}.{BY_ASSUMPTION[w]}" for w in assumed if is_main}
+                for row in _impact(event, key, group):
+                    yield replace(row, note="by assumption") if row.key in rests else row
             yield from _crash_path(answer, is_over_ground(data))
     recorders = {_word(one, "name") for one in _tables(data, "case", "units")}
     for answer in answers if len(recorders) > 1 else ():
@@ -454,13 +467,16 @@ def _crash(part: RunPart) -> Iterator[Value]:
                 yield from _force(event, f"recorders.{own}", "Each recorder", f"{own}, ")
     for one in _tables(data, "severity"):
         model, outcome = _word(one, "model") or "?", _word(one, "outcome") or ""
-        label, key = _of_main(one, f"{outcome}, {model}", f"severity.{model}", main)
+        words = f"{outcome}, {_word(one, 'source') or model}"
+        label, key = _of_main(one, words, f"severity.{model}", main)
         more = {
             k: 100.0 * v
             for k, v in _within({"": one | {"value": one.get("probability")}}, "").items()
         }
         value = _percent(_number(one, "probability"))
-        yield from _row(key, "Severity", label, value, "%", **more)
+        alone = _at(one, "model_uncertainty_in_bound") is False
+        note = "the bound leaves the uncertainty of the model out" if alone and more else ""
+        yield from _row(key, "Severity", label, value, "%", **more, note=note)
     indices = _tables(data, "indices")
     several = Counter((_word(one, "index"), _word(one, "of")) for one in indices)
     for one in indices:
@@ -515,6 +531,8 @@ def _of_main(one: Mapping[str, Any], label: str, key: str, main: str | None) -> 
     return (label, key) if of in ("", main) else (f"{label}, {of}", f"{key}.{of}")
 
 
+#: Numbers of an impact whose bound may rest on an assumption, by their names in ``on_assumption``.
+BY_ASSUMPTION = {"delta-V": "delta_v_m_per_s", "direction of force": "pdof_deg"}
 CLOSURE = (
     ("closing_speed_m_per_s", "closing speed", "m/s"),
     ("separation_speed_m_per_s", "separation speed", "m/s"),

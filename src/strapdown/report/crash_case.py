@@ -146,6 +146,8 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
             "severity": [_severity(s) for s in result.severity],
             "indices": [_index(one, result.spec.options.units) for one in result.indices],
             "references": [_reference(r) for r in result.references],
+            # Numbers of the main result whose bound is by assumptions for the most part.
+            "on_assumption": list(crash_words.on_assumption(result)),
             "assumptions": _pairs(crash_words.assumptions(result)),
             "limitations": _pairs([one[1:] for one in crash_words.limitations(result)]),
             "contradictions": _pairs(crash_words.contradictions(result)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING
@@ -420,6 +420,11 @@ def share_words(share: float) -> str:
     places = 0 if share in (0.0, 1.0) else 1
     value = 100.0 * share if share in (0.0, 1.0) else min(99.9, max(0.1, 100.0 * share))
     return f"{plain(value, places)}{GAP}%"
+
+
+def shares_words(shares: Mapping[str, float]) -> str:
+    """Format the shares that are not zero by their names: ``trusted 60 %, unverified 40 %``."""
+    return ", ".join(f"{name} {share_words(one)}" for name, one in shares.items() if one > 0.0)
 
 
 # Numbers of an alignment.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -46,7 +47,15 @@ from strapdown.report.document import (
     section,
 )
 from strapdown.report.navigation_evaluation import NavigationEvaluation, heading_spans
-from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
+from strapdown.report.values import (
+    GAP,
+    duration_words,
+    half,
+    length_words,
+    plain,
+    share_words,
+    shares_words,
+)
 from strapdown.report.values import stamp as instant
 from strapdown.systems.navigation_run import NavigationRun
 from strapdown.tables.checks import index_of
@@ -96,19 +105,36 @@ def bound_words(evaluation: NavigationEvaluation) -> str:
 def heading_words(trust: IntegrityReport) -> str:
     """Return the share of time with a trusted heading, and the status at the end."""
     heading = trust.heading
-    if not len(heading.table):
+    if not heading.spans:
         return "The run is too short to judge its heading."
-    shares = [(c, heading.share(c)) for c in STATUSES]
-    said = ", ".join(f"{c} {share_words(s)}" for c, s in shares if s > 0.0)
     last = heading.spans[-1]
-    now = f"final status: {last.status}"
-    if last.status != "trusted":
-        now += f" ({REASONS[last.reason]})"
-    elif check := check_words(trust):
+    check = "" if last.status != "trusted" else check_words(trust)
+    shares = {status: heading.share(status) for status in STATUSES}
+    return heading_sentence(shares, last.status, last.reason, check, unconfirmed_words(trust))
+
+
+def heading_sentence(
+    shares: Mapping[str, float], status: str, reason: str, check: str, why_not: str
+) -> str:
+    """Return the sentence on the heading, from its shares of the time and its final status.
+
+    Parameters
+    ----------
+    shares : mapping of str to float
+        By status, of `STATUSES`.
+    status, reason : str
+        At the end.
+    check, why_not : str
+        What confirms a trusted heading, and why no independent check could; empty without one.
+    """
+    now = f"final status: {status}"
+    if status != "trusted":
+        now += f" ({REASONS[reason]})"
+    elif check:
         now += f", confirmed by {check}"
-    if trust.unconfirmed:
-        now += f". No independent check: {unconfirmed_words(trust)}"
-    return f"Heading: {said} of the time; {now}."
+    if why_not:
+        now += f". No independent check: {why_not}"
+    return f"Heading: {shares_words(shares)} of the time; {now}."
 
 
 def worst_words(trust: IntegrityReport) -> str:

@@ -363,11 +363,17 @@ async def cancel(studio: Studio, request: Request) -> Response:
 
 async def run(studio: Studio, request: Request) -> Response:
     """Numbers, findings and inputs of a result."""
+    from strapdown.studio.runs import repeating
+
     name = run_name(studio, request)
     found = await studio.ask("run", studio.folder.path / name, name=name)
     made = next((j for j in studio.jobs.listed() if j["run"] == name), None)
     return JSONResponse(
-        {**found, "job": made and made["id"], "command_line": made["command"]}
+        {
+            **found,
+            "job": made["id"],
+            "command_line": repeating(studio.folder.path, name, made["command"]),
+        }
         if made
         else {**found, "job": None}
     )

@@ -218,7 +218,7 @@ def edited(text: str, changes: Mapping[str, Any]) -> str:
 
     Notes
     -----
-    A comment that says how a value was found or assumed is no longer true of another value: it
+    A comment that says how a value was found, measured or assumed is no longer true of another: it
     then says that the value was set by hand, and what it was. With its former value the former
     line returns.
 
@@ -244,10 +244,12 @@ def edited(text: str, changes: Mapping[str, Any]) -> str:
         raise ConfigError("studio.not-changed", reason=reason) from None
 
 
-#: How a proposal begins the remark beside a value that it found, or above it.
-GROUNDS = re.compile(r"# *(?:found|assumed): ")
+#: How a proposal, or the case of a simulation, begins the remark on where a value is from.
+GROUNDS = re.compile(r"# *(?:found|assumed|yours): ")
 #: The remark beside a value that was set by hand: what it was, as TOML, and its former remark.
-BY_HAND = re.compile(r"# set by hand; was (?P<was>.+?)(?:, (?P<remark>(?:found|assumed): .*))?$")
+BY_HAND = re.compile(
+    r"# set by hand; was (?P<was>.+?)(?:, (?P<remark>(?:found|assumed|yours): .*))?$"
+)
 #: Part of a remark on a value that nothing but a person can state.
 OWN = "only you know"
 

@@ -35,6 +35,7 @@ from strapdown.bundle import (
     sha256,
 )
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
+from strapdown.navigation.heading_integrity import STATUSES
 from strapdown.studio.folder import Folder
 from strapdown.studio.kinds import KINDS
 from strapdown.studio.look import kept_stream
@@ -165,12 +166,14 @@ def run(folder: Path, name: str) -> dict[str, Any]:
             for one in manifest["inputs"]
         ],
         # Without a heading the path of a crash is along the axes of the vehicle at its entry.
+        "heading": _heading(sealed),
         "over_ground": manifest["command"] != "crash" or is_over_ground(answer),
         # Why the verdict is not the best one; a reason is noticed, too, and once.
         "against": against,
         "findings": [one for one in against if (one["code"], one["text"]) not in said] + noticed,
         "versions": manifest["versions"],
-        "command_line": _repeating(manifest, name),
+        "verifying": shlex.join(("strapdown", "verify", name)),
+        "command_line": _repeating(folder, manifest, name),
         "figures": _figures(place, manifest, name),
         "report": f"runs/{name}/report.html" if "report.html" in has else None,
         "has": {
@@ -190,23 +193,29 @@ DRAWINGS = {
     "measuring-points": "Change of velocity at the measuring points",
     "severity": "Severity",
 }
+#: Size of a drawing, at its beginning.
+SIZE = re.compile(rb'<svg [^>]*?width="(\d{1,6}(?:\.\d{1,6})?)" height="(\d{1,6}(?:\.\d{1,6})?)"')
 #: Title of a drawing, which says in words what it shows.
 TITLE = re.compile(rb"<title>([^<]{1,2000})</title>")
 
 
-def _figures(place: Path, manifest: Mapping[str, Any], name: str) -> list[dict[str, str]]:
+def _figures(place: Path, manifest: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
     """List the drawings of the report of a crash that are shown beside its numbers.
 
-    Each has its ``title``, its ``address``, and ``alt``: what it shows, in words.
+    Each has its ``title``, its ``address``, ``alt``: what it shows, in words, and ``width`` and
+    ``height``, which a page keeps free for it.
     """
     found = []
     for slug, title in DRAWINGS.items() if manifest["command"] == "crash" else ():
         with suppress(ConfigError, OSError):
             file = f"figures/{slug}.svg"
             with file_in(place, file, manifest).open("rb") as drawn:
-                said = TITLE.search(drawn.read(8192))
+                head = drawn.read(8192)
+            said, size = TITLE.search(head), SIZE.search(head)
+            width, height = (400.0, 300.0) if size is None else map(float, size.groups())
             alt = title if said is None else html.unescape(said[1].decode(errors="replace"))
-            found.append({"title": title, "address": f"runs/{quote(name)}/{file}", "alt": alt})
+            one = {"title": title, "address": f"runs/{quote(name)}/{file}", "alt": alt}
+            found.append({**one, "width": width, "height": height})
     return found
 
 
@@ -245,9 +254,27 @@ def _numbers(sealed: SealedRun) -> list[dict[str, Any]]:
                     "unit": said["unit"],
                     # A bound of a latitude or a longitude is along the ground.
                     "bound_unit": said["bound_unit"],
+                    "note": one.note,
                 }
             )
     return found[:MOST]
+
+
+def _heading(sealed: SealedRun) -> str | None:
+    """Return what the heading integrity says, of a navigation whose heading was not all trusted."""
+    from strapdown.report.verdict import heading_sentence
+
+    if sealed.command != "navigate":
+        return None
+    # What another program wrote may have another form: it is then not told.
+    with suppress(StrapdownError, KeyError, IndexError, TypeError, ValueError, AttributeError):
+        told = sealed.parts[0].json("verdict.json")["heading"]
+        shares = {status: float(told["share"][status]) for status in STATUSES}
+        if shares["trusted"] < 1.0:
+            last, check = told["spans"][-1], told["confirmed_by"] or ""
+            why_not = "; ".join(_finding(one)["text"] for one in told["why_not"])
+            return heading_sentence(shares, last["status"], last["reason"], check, why_not)
+    return None
 
 
 def options_table(sealed: SealedRun) -> list[dict[str, Any]]:
@@ -345,13 +372,24 @@ def _configuration(manifest: Mapping[str, Any]) -> str | None:
     return None
 
 
-def _repeating(manifest: Mapping[str, Any], name: str) -> str:
-    """Return the command that repeats a result."""
+def _repeating(folder: Path, manifest: Mapping[str, Any], name: str) -> str | None:
+    """Return the command that makes a result again beside it; None: it was made with options."""
     file = _configuration(manifest)
     command = str(manifest["command"])
     if file is None or command not in ("navigate", "align", "crash"):
-        return shlex.join(("strapdown", "verify", name))
-    return shlex.join(("strapdown", command, f"{name}/{file}", "--out", f"{name}-again"))
+        return None
+    made = shlex.join(("strapdown", command, f"{name}/{file}", "--out", name))
+    return repeating(folder, name, made)
+
+
+def repeating(folder: Path, name: str, made: str) -> str:
+    """Return the command that made a result with a folder that is not there as ``--out``."""
+    words = [word for word in shlex.split(made) if word != "--force"]
+    again, number = f"{name}-again", 2
+    while (folder / again).exists():
+        again, number = f"{name}-again-{number}", number + 1
+    words[words.index("--out") + 1] = again
+    return shlex.join(words)
 
 
 # --- series and track ---------------------------------------------------------------------
@@ -612,7 +650,7 @@ def compare(folder: Path, runs: Sequence[str]) -> dict[str, Any]:
     """Compare results: the JSON of ``strapdown compare``, and the address of its page."""
     from strapdown.api.compare import compare_runs
     from strapdown.report.compare import comparison_json
-    from strapdown.report.compare_document import shown_row
+    from strapdown.report.compare_document import is_finer, shown_row
 
     place = Folder(folder)
     digests = [sha256(place.file(name) / MANIFEST) for name in runs]
@@ -628,6 +666,7 @@ def compare(folder: Path, runs: Sequence[str]) -> dict[str, Any]:
     told = comparison_json(found)
     for row, one in zip(told["numbers"], found.numbers, strict=True):
         row |= {"shown": shown_row(one, found.units), "detail": one.any.detail}
+        row["finer"] = is_finer(one, found.units)
     other = {row.key for row in found.options}
     return {
         **told,

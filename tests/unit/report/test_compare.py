@@ -18,6 +18,8 @@ from strapdown.formats import csv
 from strapdown.formats.writers import write_trajectory
 from strapdown.report.compare_document import (
     compare_document,
+    hidden_numbers,
+    is_finer,
     numbers_block,
     options_block,
     shown_row,
@@ -177,6 +179,25 @@ def test_a_difference_has_the_bound_of_independent_errors(tmp_path):
     assert table.loc["end.alt_m", "b difference"] == pytest.approx(11.0)
     assert table.loc["end.alt_m", "a high"] == pytest.approx(150.0 + 1.959964 * 3.0)
     assert not table.loc["end.alt_m", "b within"]
+
+
+def test_what_differs_by_less_than_is_shown_is_counted_apart(tmp_path):
+    """A height of 150.0 ± 5.9 m and one a millimeter above are printed alike."""
+    for name, alt, heading in (("a", 150.0, 0.0), ("b", 150.001, 0.0), ("c", 150.001, 9.0)):
+        one = state(alt=alt, sd=3.0, heading=heading)
+        sealed(tmp_path / name, files={"navigation.json": one})
+    result = sd.compare_runs(tmp_path / "a", tmp_path / "b")
+    height = row(result, "end.alt_m")
+    assert not height.same and is_finer(height, result.units)
+    assert shown_row(height, result.units)["differences"][1] == "0.0"
+    # The height, and the position that it is a part of.
+    assert numbers_block(result, short=True) is None and hidden_numbers(result) == 2
+    count = len(result.numbers)
+    assert f"No number differs by as much as is shown; 2 of {count} by less." in result.summary
+    result = sd.compare_runs(tmp_path / "a", tmp_path / "c")
+    assert f"1 of {count} numbers differs" in result.summary
+    assert "; 2 more by less than is shown." in result.summary
+    assert not is_finer(row(result, "end.heading_deg"), result.units)
 
 
 def test_a_row_is_shown_with_the_digits_of_its_bounds(tmp_path):

@@ -257,6 +257,7 @@ def test_page_one_says_which_of_its_numbers_rest_on_an_assumption(result, main):
     assert assumption_words(assumed(0.4)) == ""
     assert assumption_words(assumed(0.6)).endswith(" rest: direction of force.")
     assert "with 95 %, by assumption)" in spaced(headline(assumed(0.6)))
+    assert "direction of force" in crash_json(assumed(0.6))["on_assumption"]
 
 
 def test_a_reference_of_delta_v_is_one_difference_with_the_bound_of_both(result, main):
