@@ -157,8 +157,10 @@ await run(async () => {
   await page.locator(".attitude figcaption").getByText(/Heading/).waitFor();
   await page.locator("iframe.report").scrollIntoViewIfNeeded();
   await page.frameLocator("iframe.report").locator("h1").first().waitFor();
-  await page.getByRole("button", { name: "Copy" }).first().click();
-  assert.match(await page.evaluate(() => navigator.clipboard.readText()), /^strapdown navigate first\.toml/);
+  for (const [at, command] of [/^strapdown verify first$/, /^strapdown navigate first\.toml .*--out first-again/].entries()) {
+    await page.getByRole("button", { name: "Copy" }).nth(at).click();
+    assert.match(await page.evaluate(() => navigator.clipboard.readText()), command);
+  }
   await look("7-result");
   const [zip] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name: /\.zip/ }).click()]);
   assert.equal(await zip.failure(), null, "the result is downloaded");
