@@ -71,7 +71,7 @@ export function FilesPage() {
       }
       newWork([...new Set(Object.values(set).map(String))]);
       setWork({ kind: "crash", toml: (await api.check({ kind: "crash", toml, set })).toml, name: `${name}-crash` });
-      setWork({ proposedFor: basis(now().work) });
+      setWork({ proposedFor: basis(now().work), proposal: { questions: [], findings: [], from: `${name}/case.toml` } });
       location.hash = "#/configure";
     } catch (error) {
       setProblem(problemOf(error));

@@ -105,7 +105,8 @@ function OneFinding({ finding: one }: { finding: Finding }) {
   </li>;
 }
 
-export const sentence = (text: string) => text.charAt(0).toUpperCase() + text.slice(1) + (/[.?!]$/.test(text) ? "" : ".");
+/** A text as a sentence; the name of a file or of a measurement at its beginning stays as it is. */
+export const sentence = (text: string) => (/^[\w-]+\.\w/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1)) + (/[.?!]$/.test(text) ? "" : ".");
 
 /** An open question: answered by one click, or by a value with its unit. */
 export function Ask({ question, onAnswer, list, take, of }: { question: Question; onAnswer: (set: Record<string, unknown>) => void; list?: boolean; take?: boolean; /** The file that it is about, where there are several. */ of?: string | null | undefined }) {
