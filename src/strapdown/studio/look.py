@@ -207,25 +207,29 @@ def _with_unused(found: Mapping[str, Any], chosen: Sequence[Path]) -> dict[str, 
 
 def files_read(paths: Sequence[Path]) -> set[Path]:
     """Return the files that are read for paths, resolved."""
-    return {file for path in paths for file in _files_read(path)}
+    read = {path.resolve() for path in paths}
+    return read.union(*(_read_of(path, _digest(path)) for path in paths if path.is_dir()))
 
 
-def _files_read(path: Path) -> list[Path]:
-    """List the files that are read for a path, resolved; of a crash with those it names."""
+@lru_cache(maxsize=256)
+def _read_of(folder: Path, _: str) -> frozenset[Path]:
+    """Files that are read for a folder of this digest, resolved; it is read once for them.
+
+    Of a crash with those it names.
+    """
     from strapdown.formats import files_of, read_raw, reader_of
     from strapdown.formats.crash_records import read_crash_record, stated_format
 
-    own: Sequence[Path] = [path]
-    if path.is_dir():
-        with suppress(StrapdownError):
-            of_crash = stated_format(path) is not None
-            own = read_crash_record(path).files if of_crash else files_of(path)
-        if own == (path,) and reader_of(path)[1] is not None:
-            # A format whose reader lists no files is the whole folder.
-            own = sorted(file for file in path.rglob("*") if file.is_file())
-        with suppress(StrapdownError):
-            own = (*own, *read_raw(path).files)
-    return [path.resolve(), *(file.resolve() for file in own)]
+    own: Sequence[Path] = [folder]
+    with suppress(StrapdownError):
+        of_crash = stated_format(folder) is not None
+        own = read_crash_record(folder).files if of_crash else files_of(folder)
+    if own == (folder,) and reader_of(folder)[1] is not None:
+        # A format whose reader lists no files is the whole folder.
+        own = sorted(file for file in folder.rglob("*") if file.is_file())
+    with suppress(StrapdownError):
+        own = (*own, *read_raw(folder).files)
+    return frozenset(file.resolve() for file in own)
 
 
 #: Why a folder is no recording: it has those of several sensors.
