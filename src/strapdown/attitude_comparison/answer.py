@@ -35,6 +35,13 @@ MOST_EXTRAPOLATED = 10.0
 # Attitude error beyond which its magnitude has no meaning: angles end at half a turn.
 LOST = 90.0
 
+HOW_TO_REFERENCE = (
+    "Give a known attitude: "
+    "--reference 'end same as start' (returned to its initial attitude), "
+    "--reference 'end 2 turns about z since start', "
+    "--reference '12.5 roll 0 pitch 0 heading 90', or --reference TRUTH.csv."
+)
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -137,6 +144,11 @@ def find_answer(evidence: Evidence, tolerance_deg: float) -> Answer:
 
     If none passes, the sentence states whether the sensor or the rate is the limit.
     """
+    answer = _judged(evidence, tolerance_deg)
+    return answer if evidence.known else replace(answer, helps=(HOW_TO_REFERENCE, *answer.helps))
+
+
+def _judged(evidence: Evidence, tolerance_deg: float) -> Answer:
     passing = choices(evidence, "error_deg", tolerance_deg)
     if passing:
         return _enough(evidence, passing, tolerance_deg)
@@ -197,13 +209,11 @@ def _enough(evidence: Evidence, passing: list[Choice], tolerance: float) -> Answ
             )
     if (enough := _filter_enough(evidence, tolerance)) is not None:
         why.append(enough)
-    helps: tuple[str, ...] = ()
     if not evidence.known:
         why.append(
             "Nothing is known of the attitude here, so that this judges the algorithm and the "
             "rate, and not the sensor."
         )
-        helps = ("Name a reference point, as in --reference 'end same as start'.",)
     if evidence.sampling > UNSEEN * tolerance:
         why.append(
             "How the rate runs between its stamps is not known; it may matter by up to "
@@ -217,7 +227,7 @@ def _enough(evidence: Evidence, passing: list[Choice], tolerance: float) -> Answ
         chosen.meaning,
         chosen.rate_hz,
         tuple(why),
-        helps,
+        (),
         dropped_hz,
         evidence.holding,
     )

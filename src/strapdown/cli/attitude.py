@@ -251,7 +251,7 @@ def attitude(
         return
     if write.quiet:
         return
-    print_comparison(bench)
+    print_comparison(bench, verbose=write.verbose)
     if taken:
         _print_speed(taken)
     print_findings(bench.findings)
@@ -307,8 +307,11 @@ def _split(text: str) -> list[str]:
 MOST_LINES = 8
 
 
-def print_comparison(bench: AttitudeComparison) -> None:
-    """Print the input of the run, its tables, and the answer last, where it is visible."""
+def print_comparison(bench: AttitudeComparison, *, verbose: bool = False) -> None:
+    """Print the input of the run, its tables, and the answer last, where it is visible.
+
+    `verbose`: also how the log was read, and the tables that the answer does not rest on.
+    """
     from strapdown.cli.console import console, print_table
     from strapdown.errors import printable
     from strapdown.report import attitude_tables as tables
@@ -327,18 +330,22 @@ def print_comparison(bench: AttitudeComparison) -> None:
         )
     for name, text in words.facts(bench):
         page.print(f"{name}: {text}")
+    sweeps = tables.sweep_tables(bench)
+    aided = [tables.peer_table(bench), tables.filter_table(bench)]
+    beside = [*sweeps[1:], *([] if bench.scores else aided)]
     shown = [
         *tables.result_tables(bench),
-        *tables.sweep_tables(bench),
+        *sweeps[:1],
         tables.budget_table(bench),
         tables.trial_table(bench),
         tables.place_table(bench),
-        tables.peer_table(bench),
-        tables.filter_table(bench),
+        *(aided if bench.scores else []),
+        *(beside if verbose else []),
     ]
-    for table in shown:
-        if table is not None:
-            _print_table(table, page)
+    for table in filter(None, shown):
+        _print_table(table, page)
+    if not verbose and (further := [table.title for table in filter(None, beside)]):
+        page.print(f"\nWith --verbose, and on the page: {'; '.join(further)}.\n")
     points = words.reference_lines(bench)
     for point in points[:MOST_LINES]:
         page.print(point)
@@ -351,8 +358,6 @@ def print_comparison(bench: AttitudeComparison) -> None:
             page.print(f"{title}:")
         for line in lines:
             page.print(f"  - {line}")
-    if not bench.scores:
-        page.print(words.HOW_TO_REFERENCE)
     if offers := words.offer_lines(bench):
         page.print("Rests of similar attitude, possible reference points:")
     for line in offers:

@@ -130,7 +130,6 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             *_named_items("To be considered beside it:", warnings),
             *_named_items("Why:", answer.why),
             *_named_items("Remedies:", answer.helps),
-            None if bench.scores else Paragraph(words.HOW_TO_REFERENCE),
             *_named_items(
                 "Rests of similar attitude, possible reference points:", words.offer_lines(bench)
             ),

@@ -278,14 +278,13 @@ def peer_table(bench: AttitudeComparison) -> TableBlock | None:
     Returns
     -------
     TableBlock or None
-        None if no other library ran.
+        None if no other library ran, or no attitude is known.
     """
-    if not bench.peers:
+    if not (bench.peers and bench.scores):
         return None
     alone, aided = like_with_like(bench)
-    judged = bool(bench.scores)
     rows = [
-        (f"strapdown {name}", degrees(error) if judged else _NONE, "", "gyro")
+        (f"strapdown {name}", degrees(error), "", "gyro")
         for name, error in full_rate_errors(bench).items()
     ]
     rows += [(p.peer, degrees(largest_known(p.scores)), "", p.aiding) for p in alone]
@@ -314,24 +313,29 @@ def filter_table(bench: AttitudeComparison) -> TableBlock | None:
     _, aided = like_with_like(bench)
     if not aided:
         return None
-    return TableBlock(
-        (
-            *("filter", "uses", "RMS", "final", "tilt", "heading", "drift/min", "in 95 %"),
-            *(f"≤ {bench.answer.tolerance_deg:g}° to", "float32", "ops", "bytes"),
-        ),
-        tuple(_filter_row(peer) for peer in aided),
-        text=(0, 1),
-        caption="Root mean square and final error against the truth; its parts about a level axis "
-        "and about the vertical; without a magnetometer the heading is that of the truth at the "
-        "start. Drift: root mean square change of the heading error over a minute, or over half "
-        "of a shorter record, per minute. In 95 %: share of the time in which inclination and "
-        "heading are within their stated 95 % bounds. ≤: lowest rate, with samples averaged, "
-        "down to which the largest error is within the tolerance; in brackets, that of roll and "
-        "pitch. "
-        "Float32: largest difference in single precision. Ops: operations a sample, as counted on "
-        "the kernel; bytes: kept between samples in single precision.",
-        title="Aided filters",
+    columns = (
+        *("filter", "uses", "RMS", "final", "tilt", "heading", "drift/min", "in 95 %"),
+        *(f"≤ {bench.answer.tolerance_deg:g}° to", "float32", "ops", "bytes"),
     )
+    rows = [_filter_row(peer) for peer in aided]
+    errors = slice(2, 9)  # against a truth
+    caption = (
+        "Float32: largest difference in single precision. Ops: operations a sample, as counted on "
+        "the kernel; bytes: kept between samples in single precision."
+    )
+    if any(cell not in ("", _NONE) for row in rows for cell in row[errors]):
+        caption = (
+            "Root mean square and final error against the truth; its parts about a level axis "
+            "and about the vertical; without a magnetometer the heading is that of the truth at "
+            "the start. Drift: root mean square change of the heading error over a minute, or over "
+            "half of a shorter record, per minute. In 95 %: share of the time in which inclination "
+            "and heading are within their stated 95 % bounds. ≤: lowest rate, with samples "
+            "averaged, down to which the largest error is within the tolerance; in brackets, that "
+            f"of roll and pitch. {caption}"
+        )
+    else:
+        columns, *rows = (row[: errors.start] + row[errors.stop :] for row in (columns, *rows))
+    return TableBlock(columns, tuple(rows), text=(0, 1), caption=caption, title="Aided filters")
 
 
 def _filter_row(peer: PeerRun) -> tuple[str, ...]:

@@ -31,12 +31,6 @@ CONVENTIONS = (
     ("Error", "rotation angle |log(C_est^T C_ref)| in degrees, whatever the axis"),
     ("Earth rate", "neglected, as in Alexiev (2021): 15°/h"),
 )
-HOW_TO_REFERENCE = (
-    "No reference. Give a known attitude: "
-    "--reference 'end same as start' (returned to its initial attitude), "
-    "--reference 'end 2 turns about z since start', "
-    "--reference '12.5 roll 0 pitch 0 heading 90', or --reference TRUTH.csv."
-)
 
 
 # Two exact algorithms that differ by less are taken as equal.

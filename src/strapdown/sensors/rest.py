@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -151,20 +152,21 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     quiet = max(QUIET_FACTOR * float(np.quantile(gyro_sd, QUIET_QUANTILE)), ROUNDING)
     still = gyro_sd <= min(quiet, MAX_GYRO_SD)
     still &= np.abs(rate).max(axis=1) <= MAX_MEAN_RATE
-    root = np.sqrt(ends - starts)
-    slow = [(rate, gyro_sd / root, MAX_RATE_CHANGE)]
+    begins, count = time[starts], ends - starts
+    slow = [(rate, _sd_beside_slope(begins, rate, gyro_sd, count), MAX_RATE_CHANGE)]
     if accel is not None:
         force, variance = _window_moments(accel, starts, ends)
         accel_sd = np.sqrt(variance.sum(axis=1))
         still &= accel_sd <= MAX_ACCEL_SD
-        slow.append((force, accel_sd / root, MAX_ACCEL_CHANGE))
-    begins = time[starts]
+        sd = _sd_beside_slope(begins, force, accel_sd, count)
+        slow.append((force, sd, MAX_ACCEL_CHANGE))
     drifts = _drifts(begins, slow, still)
     joined = begins[1:] - time[ends[:-1] - 1] < LEAST_LENGTH
     rests = [
         _stretch(time, gyro, accel, int(starts[a]), int(ends[b]))
         for a, b in _runs(still & ~drifts, joined)
         if time[ends[b] - 1] - begins[a] >= LEAST_LENGTH
+        and not _bends(begins, slow, a, b)
         and not _continues(begins, slow, drifts, np.arange(a, b + 1))
     ]
     return of_one_bias(rests)
@@ -220,6 +222,20 @@ def _of_columns(statistic: Callable[..., Array], values: Array, **options: int) 
     return np.array(found)
 
 
+def _sd_beside_slope(start: Array, mean: Array, sd: Array, count: Indices) -> Array:
+    """Standard deviation of the means of windows, (n,), without what their slope adds to it.
+
+    A smooth motion is a slope within half a second: as noise it would hide itself. `start` ((n,),
+    s), `mean` ((n, 3)) and `sd` ((n,)) of each window, `count` of its samples. A slope is that
+    between the windows before and after.
+    """
+    before, after = (np.clip(np.arange(len(start)) + k, 0, len(start) - 1) for k in (-1, 1))
+    span = np.maximum(start[after] - start[before], 0.5 * WINDOW)
+    slope = np.linalg.norm(mean[after] - mean[before], axis=1) / span
+    of_slope = np.square(slope * WINDOW) / 12.0
+    return np.asarray(np.sqrt(np.maximum(np.square(sd) - of_slope, 0.0) / count))
+
+
 def _drifts(
     start: Array,
     slow: Sequence[tuple[Array, Array, float]],
@@ -250,6 +266,19 @@ def _drifts(
             np.add.at(changes, last[moved] + 1, -1)
         left &= np.cumsum(changes)[:-1] == 0
     return np.asarray(still & ~left)
+
+
+def _bends(start: Array, slow: Sequence[tuple[Array, Array, float]], first: int, last: int) -> bool:
+    """Whether a run of windows too short for `_drifts` differs at begin, middle and end."""
+    if start[last] - start[first] > 1.5 * LAGS[0]:
+        return False
+    at = np.array([first, (first + last) // 2, last])
+    for mean, sd, most in slow:
+        for one, other in itertools.combinations(at, 2):
+            limit = most + 4.0 * math.hypot(sd[one], sd[other])
+            if np.linalg.norm(mean[other] - mean[one]) > limit:
+                return True
+    return False
 
 
 def _continues(

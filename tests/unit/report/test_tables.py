@@ -182,7 +182,7 @@ def test_each_algorithm_names_its_own_source(make_bench):
 
 
 def test_nine_algorithms_fit_a_terminal(full_bench, capsys):
-    print_comparison(full_bench)
+    print_comparison(full_bench, verbose=True)
     lines = capsys.readouterr().out.splitlines()
     ruled = [k for k, line in enumerate(lines) if "───" in line]
     assert len(ruled) == 6
@@ -197,7 +197,34 @@ def test_little_prints_as_well(make_bench, capsys):
     print_comparison(make_bench(("quaternion",), truth=False, sweep=False))
     out = capsys.readouterr().out
     assert "quaternion ran over the log." in out
-    assert "--reference" in out
+    assert "away two thirds of what is left" in out
+
+
+def test_without_a_known_attitude_no_table_has_an_empty_column(make_bench, full_bench, capsys):
+    bench = replace(
+        full_bench, scores=(), peers=tuple(replace(p, scores=()) for p in full_bench.peers)
+    )
+    assert tables.peer_table(bench) is None
+    own = replace(bench.peers[1], errors=None, ran=None, lowest_hz=None, lowest_level_hz=None)
+    table = tables.filter_table(replace(bench, peers=(own,)))
+    assert table.columns == ("filter", "uses", "float32", "ops", "bytes")
+    assert all(len(row) == len(table.columns) for row in table.rows)
+    assert "against the truth" not in table.caption
+
+
+def test_the_terminal_names_the_tables_that_only_verbose_prints(full_bench, capsys):
+    print_comparison(full_bench)
+    brief = capsys.readouterr().out
+    print_comparison(full_bench, verbose=True)
+    whole = capsys.readouterr().out
+    first, *others = [table.title for table in tables.sweep_tables(full_bench)]
+    assert others
+    assert f"\n{first}\n" in brief
+    for title in others:
+        assert f"\n{title}\n" not in brief
+        assert f"\n{title}\n" in whole
+    assert f"With --verbose, and on the page: {'; '.join(others)}." in brief
+    assert "--verbose" not in whole
 
 
 def test_json_has_everything_and_every_number_its_unit(full_bench):

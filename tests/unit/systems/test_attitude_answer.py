@@ -125,7 +125,9 @@ def test_nothing_known_judges_the_own_error_and_says_so():
     assert "Nothing is known of the attitude" in found.why[-1]
     assert "--reference" in found.helps[0]
     # And where its own error is too large, the sensor cannot be blamed.
-    assert find_answer(evidence({"naive": [5.0]}, known=False, sensor=None), 1).verdict == "rate"
+    rate = find_answer(evidence({"naive": [5.0]}, known=False, sensor=None), 1)
+    assert rate.verdict == "rate"
+    assert "--reference" in rate.helps[0]
 
 
 def test_the_sensor_is_the_limit():
