@@ -313,7 +313,7 @@ def filter_table(bench: AttitudeComparison) -> TableBlock | None:
     _, aided = like_with_like(bench)
     if not aided:
         return None
-    columns = (
+    columns: tuple[str, ...] = (
         *("filter", "uses", "RMS", "final", "tilt", "heading", "drift/min", "in 95 %"),
         *(f"≤ {bench.answer.tolerance_deg:g}° to", "float32", "ops", "bytes"),
     )
