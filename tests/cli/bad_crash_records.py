@@ -93,6 +93,7 @@ RECORD_CALLS = (
     RecordCall("A channel named twice", {"log.csv": LOG}, {"x": "ax [g]", "y": "-ax [g]"}),
     RecordCall("The other sign", {"log.csv": LOG}, {"x": "-ax [g]"}),
     RecordCall("NaN in a channel", {"log.csv": LOG.replace("-4.2", "NaN")}, X),
+    RecordCall("A value of no sensor", {"log.csv": LOG.replace("-4.2", "-4.2e24")}, X),
     RecordCall("Text in a channel", {"log.csv": LOG.replace("-4.2", "off")}, X),
     RecordCall("A record's time that goes back", {"log.csv": LOG.replace("\n3,", "\n1,")}, X),
     RecordCall("Stamps that repeat", {"log.csv": LOG.replace("\n3,", "\n2,")}, X),

@@ -22,7 +22,12 @@ from strapdown.formats.columns import (
     without_accents,
 )
 from strapdown.formats.crash_edr import KMH, rounding
-from strapdown.formats.crash_record import CrashChannel, CrashRecord, position_of
+from strapdown.formats.crash_record import (
+    CrashChannel,
+    CrashRecord,
+    position_of,
+    refuse_impossible,
+)
 from strapdown.formats.crash_samples import (
     last_midnight,
     mean_accelerations_of,
@@ -203,6 +208,8 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
             skipped.append(Skipped(path, f"column '{name}'", error.finding, (name,)))
             continue
         headings[name] = heading
+        if channel.quantity in ("acceleration", "rate"):
+            refuse_impossible(channel, raw)
         if heading.quantity == "time":
             raw = past_midnight(raw, heading.unit if heading.unit in TIME_UNITS else "")
         if raw.dtype.kind in "iu" and raw.size and abs(int(raw[0])) > FAR:
@@ -1178,6 +1185,7 @@ def _block(
             continue
         try:
             curves[axis] = channel.load()
+            refuse_impossible(channel, curves[axis][1])
         except DataError as error:
             what = f"channel {channel.name}"
             unread.append(Skipped(path, what, error.finding, (channel.name,), at.vehicle))

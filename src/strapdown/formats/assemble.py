@@ -28,6 +28,7 @@ from strapdown.formats.clocks import (
     with_clock,
 )
 from strapdown.formats.columns import parse_axes, read_name
+from strapdown.formats.crash_record import IMPOSSIBLE_FORCE, IMPOSSIBLE_RATE
 from strapdown.formats.find_columns import (
     AXES,
     Column,
@@ -686,10 +687,6 @@ def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]
 
 PLAUSIBILITY_AXES = "xyz"
 
-# Upper limits of any rate and specific force; squares of larger ones soon overflow a double. A
-# shell is fired with 1e6 m/s².
-IMPOSSIBLE_RATE = 1e6  # rad/s
-IMPOSSIBLE_FORCE = 1e8  # m/s²
 # No body that is carried, driven or flown turns this fast for a twentieth of a log.
 LASTING_RATE = 20.0  # rad/s, 3 turns a second
 # No gyro in a phone, a toy, a car or an aircraft reads this; a wrong unit does.

@@ -192,6 +192,41 @@ class CrashRecord:
         )
 
 
+# Values that no sensor reads.
+
+
+# Upper limits of any rate and specific force; squares of larger ones soon overflow a double. A
+# shell is fired with 1e6 m/s².
+IMPOSSIBLE_RATE = 1e6  # rad/s
+IMPOSSIBLE_FORCE = 1e8  # m/s²
+#: Of a channel whose unit is not known: beyond the limits in any of the known units.
+IMPOSSIBLE_NUMBER = 1e12
+
+
+def refuse_impossible(channel: CrashChannel, values: NDArray[Any]) -> None:
+    """Refuse values, (n,), as `CrashChannel.load` returns them, beyond the limits of any body.
+
+    DataError: names row and channel.
+    """
+    limit = IMPOSSIBLE_NUMBER
+    if channel.unit:
+        limits = {"acceleration": IMPOSSIBLE_FORCE, "rate": IMPOSSIBLE_RATE}
+        limit = limits.get(channel.quantity, limit)
+    beyond = np.flatnonzero(np.abs(values) > limit)
+    if beyond.size:
+        raise DataError(
+            "io.crash-value-impossible",
+            file=channel.file or None,
+            row=channel.row(int(beyond[0])),
+            quantity=f"channel {channel.name}",
+            value=float(values[beyond[0]]),
+            unit={"acceleration": " m/s²", "rate": " rad/s"}.get(
+                channel.quantity if channel.unit else "", ""
+            ),
+            count=int(beyond.size),
+        )
+
+
 # Cleaning of untrusted texts from files, for names and messages.
 
 

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.formats.clocks import EPOCH
-from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
+from strapdown.formats.crash_record import (
+    QUANTITIES,
+    CrashChannel,
+    CrashRecord,
+    refuse_impossible,
+)
 from strapdown.formats.crash_samples import Clock, last_midnight, past_midnight, seconds_of
 from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.triad_units import what_numbers_say
@@ -235,6 +240,7 @@ def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:
             file=channel.file or None,
             quantity=f"channel {channel.name}",
         )
+    refuse_impossible(channel, values)
     there = np.flatnonzero(np.isfinite(values))
     endless = np.flatnonzero(np.isinf(values))
     hole = -1

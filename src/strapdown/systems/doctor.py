@@ -78,6 +78,12 @@ Array = NDArray[np.float64]
 
 #: Uses that a log is judged for.
 USES = ("attitude", "navigation", "crash")
+# What a log is refused for that is in no record of a crash, whatever words its columns have: it is
+# a table of positions, or its values are those of no body.
+OF_NO_CRASH = frozenset({"io.table-of-positions", "io.rate-impossible", "io.force-impossible"})
+# Largest specific force of an impact over the median of its record, at least: a hand swings a phone
+# with less.
+STRUCK = 4.0
 #: Rounds of questions of one file: a unit that is known may open the next question.
 ROUNDS = 4
 #: Sample rates below which an attitude misses ordinary motion, and all motion, Hz.
@@ -289,13 +295,11 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
         elif missing.code not in ABSENT:
             findings.append(missing.replace(severity="warning"))
     lacks = raw is not None and missing is not None and missing.code in ABSENT
-    # A table of positions is none of a crash, whatever words its columns have.
-    of_another = inertial.imu is not None or (
-        missing is not None and missing.code == "io.table-of-positions"
-    )
     crash = None if record is None else len(record.channels)
+    of_another = inertial.imu is not None or (missing is not None and missing.code in OF_NO_CRASH)
     if record is None and not of_another:
-        crash = _crash_record(log.path, lacks)
+        # A log with all of its sensors is a log first, whose units are asked.
+        crash = _crash_record(log.path, lacks, struck=bool(inertial.questions) and not lacks)
     impact = None if inertial.imu is None else _impact(inertial.imu)
     order = {"error": 0, "warning": 1}
     faults = sorted((f for f in findings if f.severity in order), key=lambda f: order[f.severity])
@@ -505,19 +509,25 @@ def _columns(path: str, form: str) -> RawLog | None:
     return raw if isinstance(raw, RawLog) and raw.columns else None
 
 
-def _crash_record(path: str, lacks: bool) -> int | None:
+def _crash_record(path: str, lacks: bool, *, struck: bool) -> int | None:
     """Return the number of channels that the file has as a crash record.
 
     `lacks`: whether it is a table without the columns of a sensor, of which any may be one of a
-    crash; otherwise its channels must say that they are. None where no channel can be an
+    crash; otherwise its channels must say that they are. `struck`: only if its accelerations, in
+    whatever unit, exceed their usual size as in an impact. None where no channel can be an
     acceleration, a rate or a velocity, as in a table of attitudes.
     """
     from strapdown.formats.crash_records import read_crash_record
 
     try:
         channels = read_crash_record(path).channels
+        forces = [c.load()[1] for c in channels if struck and c.quantity == "acceleration"]
     except StrapdownError:
         return None
+    if struck and forces:
+        size = np.sqrt(sum(np.square(force) for force in forces))
+        if not size.max() > STRUCK * np.median(size):
+            return None
     quantities = {one.quantity for one in channels}
     useful = quantities - {"time", "counter", "other"}
     return len(channels) if (useful if lacks else useful - {""}) else None

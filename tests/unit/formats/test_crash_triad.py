@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tests.coded import coded
 
+from strapdown.crash.record_parts import table_parts
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_records import read_crash_record
@@ -154,6 +155,22 @@ def test_a_hole_in_four_rows_is_one(read):
     with pytest.raises(DataError, check=coded("io.not-finite-number-such")) as error:
         triad_of_channels(record, {"x": "ax [g]"}, quantity="acceleration")
     assert error.value.finding.row == 4
+
+
+@pytest.mark.parametrize("most", [1.1e7, 1e25])  # g; the limit is 1e8 m/s²
+def test_a_value_of_no_sensor_is_named_by_its_row(read, most):
+    rows = [f"{k},{most if k == 5 else 0.1},{k}" for k in range(20)]
+    record = read("t [ms],ax [g],ay [g]\n" + "\n".join(rows) + "\n")
+    for find in (
+        lambda: triad_of_channels(record, {"x": "ax [g]"}, quantity="acceleration"),
+        lambda: table_parts("crash.csv", record),
+    ):
+        with pytest.raises(DataError, check=coded("io.crash-value-impossible")) as error:
+            find()
+        found = error.value.finding
+        assert (found.row, found.data["count"]) == (7, 1)
+        assert found.data["value"] == pytest.approx(most * 9.80665)
+    triad_of_channels(record, {"y": "ay [g]"}, quantity="acceleration")
 
 
 def test_channels_with_stamps_of_their_own_are_put_beside_each_other():

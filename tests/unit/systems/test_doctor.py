@@ -605,3 +605,25 @@ def test_a_table_of_attitudes_alone_is_no_crash_record(tmp_path, unit):
     read = "doctor.crash-record" in [f.code for f in one.fit["crash"]]
     assert read == (unit == "g")
     assert read == all(f.severity != "error" for f in one.fit["crash"])
+
+
+@pytest.mark.parametrize(
+    ("fault", "crash"), [("counts", False), ("impact", True), ("rate", False), ("force", False)]
+)
+def test_a_log_with_open_questions_is_a_crash_only_where_something_struck(tmp_path, fault, crash):
+    """Counts of a phone's sensors had been "fit for crash with limits" and for nothing else."""
+    rng, time = np.random.default_rng(3), np.arange(0.0, 30.0, 0.01)
+    values = np.column_stack([rng.normal(0.0, 0.05, (time.size, 5)), 1.0 + 0.01 * np.sin(time)])
+    names = ["gx", "gy", "gz", "ax", "ay", "az"]
+    if fault == "counts":
+        values = np.round(16384.0 * values)
+    elif fault == "impact":
+        values[:, 3] -= 20.0 * np.exp(-np.square((time - 15.0) / 0.05))
+    else:
+        names = ["gx_rad_s", "gy_rad_s", "gz_rad_s", "ax_m_s2", "ay_m_s2", "az_m_s2"]
+        values[1000, 0 if fault == "rate" else 3] = 1e25
+    pd.DataFrame(dict(zip(["t", *names], [time, *values.T], strict=True))).to_csv(
+        tmp_path / "log.csv", index=False
+    )
+    (one,) = sd.doctor(tmp_path / "log.csv").logs
+    assert ("doctor.crash-record" in [f.code for f in one.fit["crash"]]) == crash
