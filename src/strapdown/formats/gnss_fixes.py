@@ -13,7 +13,7 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.arrays import told_by_file_rows
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
 from strapdown.tables import gnss_table
-from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables.checks import GEODETIC, HEIGHTS_AS_STATED, POSITION_SD, VELOCITY, VELOCITY_SD
 
 __all__ = ["Fixes", "GnssOptions", "table_of_fixes"]
 
@@ -186,6 +186,8 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     with_clock(table, fixes.clock)
     table.attrs["findings"] = tuple(fixes.findings)
     table.attrs.update(taken)
+    if fixes.heights_from not in ("", NOWHERE) and not options.datum_height:
+        table.attrs[HEIGHTS_AS_STATED] = True
     table.attrs["first_row"] = first_of(fixes.rows[at])
     return table
 

@@ -261,11 +261,12 @@ def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
     lat, lon = values_of(gnss, ["lat", "lon"]).T.tolist()
     sd = values_of(gnss, POSITION_SD)
     lines = []
+    separation = f"{geoid:.{_HEIGHT}f}" if np.isfinite(geoid) else ""
     for k, date in enumerate(iso_dates(stamps)):
         time = date[11:-1].replace(":", "")
         day = date[8:10] + date[5:7] + date[2:4]
         place = f"{_minutes(lat[k], 2, 'NS')},{_minutes(lon[k], 3, 'EW')}"
-        height = f"{over_sea[k]:.{_HEIGHT}f},M,{geoid:.{_HEIGHT}f},M"
+        height = f"{over_sea[k]:.{_HEIGHT}f},M,{separation},M"
         lines.append(_sentence(f"GPGGA,{time},{place},{quality[k]},,,{height},,"))
         moves = ","
         if np.isfinite(speed[k]):

@@ -110,6 +110,9 @@ _OVER_SEA = (
 )
 
 
+_AS_STATED = "Elevations (ele) are {height}."
+
+
 def write_gpx(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
     """Write one track of the fixes, or of the positions of a trajectory.
 
@@ -129,12 +132,14 @@ def write_gpx(path: Path, tables: Tables, options: FileOptions) -> list[Finding]
     findings += [*said, *warned, *fixes_not_held("GPX", gnss, position_sd=False)]
     speed, course = (v.tolist() for v in over_ground(gnss))
     heights = _HEIGHTS if options.geoid_undulation is None else _OVER_SEA.format(geoid=geoid)
+    if options.heights_as_stated:
+        heights = _AS_STATED.format(height=options.height)
+    geoid_text = f"<geoidheight>{_decimal(geoid)}</geoidheight>" if np.isfinite(geoid) else ""
     name = escape(one_line(options.name), quote=False)
     lines = [_BEGIN.format(name=name, heights=heights)]
     times = [""] * len(gnss)
     if stamps is not None:
         times = [f"<time>{date}</time>" for date in iso_dates(stamps)]
-    geoid_text = _decimal(geoid)
     quality = values_of(gnss, ["quality"])[:, 0].astype(int).tolist()
     places = zip(*values_of(gnss, ["lat", "lon"]).T.tolist(), over_sea.tolist(), strict=True)
     for k, ((lat, lon, ele), time) in enumerate(zip(places, times, strict=True)):
@@ -147,7 +152,7 @@ def write_gpx(path: Path, tables: Tables, options: FileOptions) -> list[Finding]
         fix = f"<fix>{_FIX[quality[k]]}</fix>" if quality[k] in _FIX else ""
         lines.append(
             f'<trkpt lat="{_decimal(lat)}" lon="{_decimal(lon)}"><ele>{_decimal(ele)}</ele>{time}'
-            f"<geoidheight>{geoid_text}</geoidheight>{fix}{moves}</trkpt>\n"
+            f"{geoid_text}{fix}{moves}</trkpt>\n"
         )
     lines.append("</trkseg></trk>\n</gpx>\n")
     path.write_bytes("".join(lines).encode())

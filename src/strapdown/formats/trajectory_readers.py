@@ -20,6 +20,7 @@ from strapdown.formats.recording import RawLog
 from strapdown.formats.vocabularies import TRAJECTORIES
 from strapdown.rotation import within_half_turn
 from strapdown.tables import EULER, VELOCITY, trajectory_table
+from strapdown.tables.checks import HEIGHTS_AS_STATED
 
 __all__ = [
     "find_trajectory_columns",
@@ -31,6 +32,9 @@ __all__ = [
 Array = NDArray[np.float64]
 
 
+#: Level of the heights, in the comments of a trajectory: that of the fixes.
+AS_STATED = "as the fixes state them"
+_AS_STATED = re.compile(rf"[#%]\s*heights\s*:\s*{AS_STATED}\s*$", re.M)
 _ELLIPSOID = re.compile(r"[#%]\s*ellipsoid\s*:\s*(\S+)\s*$", re.M)
 
 
@@ -86,9 +90,12 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
         euler_stated=found["heading"].stated,
     )
     with path.open("rb") as stream:
-        stated = _ELLIPSOID.search(stream.read(4096).decode("utf-8", "replace"))
+        head = stream.read(4096).decode("utf-8", "replace")
+    stated = _ELLIPSOID.search(head)
     with_clock(table, Clock(clock))
     table.attrs["ellipsoid"] = stated.group(1) if stated else None
+    if _AS_STATED.search(head):
+        table.attrs[HEIGHTS_AS_STATED] = True
     table.attrs["findings"] = (*raw.findings, *judged)
     return table
 

@@ -22,6 +22,7 @@ from strapdown.errors import DataError
 from strapdown.evaluation.trajectory_differences import ROTATION_ERROR
 from strapdown.formats import csv, table_files
 from strapdown.formats.clocks import clock_of, time_column
+from strapdown.formats.trajectory_readers import AS_STATED
 from strapdown.formats.writing import FileOptions
 from strapdown.frames import ecef_from_geodetic
 from strapdown.rotation import within_half_turn
@@ -83,10 +84,12 @@ def told_of(options: FileOptions) -> dict[str, str]:
     told = {
         "trajectory": one_line(options.name),
         "ellipsoid": options.ellipsoid.name,
-        "place": "geodetic, height over the ellipsoid",
+        "place": f"geodetic, height {options.height}",
         "velocity": "relative to the Earth, north east down",
         "attitude": "body forward-right-down to north-east-down",
     }
+    if options.heights_as_stated:
+        told["heights"] = AS_STATED
     return told if options.epoch is None else {**told, "epoch": options.date(0.0)}
 
 
@@ -312,7 +315,7 @@ def _path_feature(
         "start_s": float(time[0]),
         "end_s": float(time[-1]),
         **speeds,
-        "height": "over the WGS 84 ellipsoid",
+        "height": options.height,
         **_dates(options, {"start_utc": float(time[0]), "end_utc": float(time[-1])}),
         "time_s": times[0] if len(parts) == 1 else times,
     }
@@ -418,6 +421,8 @@ def write_kml(path: Path, trajectory: pd.DataFrame, options: FileOptions | None 
 
 
 def _description(thinned: Thinned, options: FileOptions) -> str:
+    if options.heights_as_stated:
+        return f"{thinned.sentence} Heights are {options.height}."
     heights = (
         "Heights are over the WGS 84 ellipsoid, and KML counts them from the EGM96 geoid: what "
         "is shown is too high by the height of the geoid over the ellipsoid there, -110 to 90 m."

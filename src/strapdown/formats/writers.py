@@ -63,7 +63,15 @@ from strapdown.tables import (
     check_imu,
     check_trajectory,
 )
-from strapdown.tables.checks import GEODETIC, MAG, NED, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables.checks import (
+    GEODETIC,
+    HEIGHTS_AS_STATED,
+    MAG,
+    NED,
+    POSITION_SD,
+    VELOCITY,
+    VELOCITY_SD,
+)
 
 __all__ = [
     "LOG_FORMATS",
@@ -136,7 +144,10 @@ class Writer:
                 kept["reference"] = held["reference"]
             lost += [_of_own_file(k, held[k]) for k in held if k not in kept]
             held = kept
-        lost += self.function(path, held, options or FileOptions()) or []
+        chosen = options or FileOptions()
+        if any(table.attrs.get(HEIGHTS_AS_STATED) for table in held.values()):
+            chosen = dataclasses.replace(chosen, heights_as_stated=True)
+        lost += self.function(path, held, chosen) or []
         if self.alone:
             lost += _clock_lost(held)
         left = {f.quantity for f in lost if f.code == "io.stream-not-written"}

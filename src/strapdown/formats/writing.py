@@ -27,7 +27,15 @@ from strapdown.formats.clocks import (
     unix_from_gps,
 )
 from strapdown.tables import ACCEL, QUATERNION
-from strapdown.tables.checks import GEODETIC, MAG, POSITION_SD, VELOCITY, VELOCITY_SD, values_of
+from strapdown.tables.checks import (
+    GEODETIC,
+    MAG,
+    POSITION_SD,
+    VELOCITY,
+    VELOCITY_SD,
+    height_words,
+    values_of,
+)
 
 __all__ = [
     "FLU",
@@ -79,6 +87,8 @@ class FileOptions:
     digits : {'exact', 'fixed'}
         For CSV: the fewest that reproduce each number, or a fixed number of decimals, which is
         faster.
+    heights_as_stated : bool
+        Whether the heights count from the level of the fixes, and not from the ellipsoid.
 
     Raises
     ------
@@ -94,6 +104,7 @@ class FileOptions:
     tum_frame: str = "enu"
     origin: tuple[float, float, float] | None = None
     digits: str = "exact"
+    heights_as_stated: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.ellipsoid, Ellipsoid):
@@ -123,6 +134,11 @@ class FileOptions:
         ):
             raise ConfigError("io.no-origin", quantity="origin", origin=list(self.origin))
         check_choice("io.digits-unknown", DIGITS, quantity="digits", digits=self.digits)
+
+    @property
+    def height(self) -> str:
+        """Level from which the heights count, in words."""
+        return height_words(as_stated=self.heights_as_stated)
 
     def require_wgs84(self, form: str) -> None:
         """Refuse positions that a format would misinterpret.
@@ -373,8 +389,14 @@ def fixes_not_held(form: str, gnss: pd.DataFrame, *, position_sd: bool) -> list[
 
 
 def heights_of(gnss: pd.DataFrame, options: FileOptions) -> tuple[Array, float, list[Finding]]:
-    """Return heights over the sea, the height of the geoid, and a warning if it is not stated."""
+    """Return heights over the sea, the height of the geoid, and a warning if it is not stated.
+
+    Heights as the fixes state them stay so; the height of the geoid is NaN if it is not stated.
+    """
     heights = gnss["alt"].to_numpy(dtype=np.float64)
+    if options.heights_as_stated:
+        geoid = options.geoid_undulation
+        return heights, np.nan if geoid is None else float(geoid), []
     if options.geoid_undulation is None:
         source = gnss.attrs.get("source")
         return heights, 0.0, [Finding("io.written-height-over-ellipsoid", file=source)]

@@ -49,7 +49,7 @@ from strapdown.report.report_bundle import bundle_by_specification, finite, with
 from strapdown.report.values import duration_words, instant, small
 from strapdown.systems.doctor import USES, Diagnosis, LogDiagnosis, refused_fixes, run_doctor
 from strapdown.tables import ACCEL, GEODETIC, GYRO, VELOCITY, VELOCITY_SD, find_gaps
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.checks import HEIGHTS_AS_STATED, height_words, index_of, values_of
 
 #: Commands of the uses.
 COMMANDS = {"attitude": "attitude", "navigation": "init navigate", "crash": "init crash"}
@@ -503,11 +503,12 @@ def fix_chart(one: LogDiagnosis, slug: str = "") -> Chart | None:
         return None
     time = index_of(gnss)
     speed = _speed(one)
+    level = height_words(as_stated=bool(gnss.attrs.get(HEIGHTS_AS_STATED)))
     height = curve("height", time, gnss["alt"].to_numpy(), BLUE, width=1.2, buckets=BUCKETS)
     steps = curve("step", time[1:], np.diff(time), GREY, width=0.9, buckets=BUCKETS)
     panels = [
         *([Panel("speed, m/s", (speed,), title="Speed over ground")] if speed else []),
-        Panel("height, m", (height,), title="Height over the ellipsoid"),
+        Panel("height, m", (height,), title=f"Height {level}"),
         Panel("step, s", (steps,), title="Steps of time", height=0.6),
     ]
     return Chart(f"{slug}fixes", "Fixes", "", "time, s", tuple(panels))

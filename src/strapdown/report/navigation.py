@@ -29,8 +29,8 @@ from strapdown.navigation.record import NavigationRecord
 from strapdown.progress import Progress
 from strapdown.report.chart import Array
 from strapdown.report.navigation_document import (
-    CONVENTIONS,
     cautions,
+    conventions,
     headline,
     navigation_document,
 )
@@ -184,7 +184,7 @@ def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
     time = record.trajectory.index
     clock = clock_of(source.imu)
     data = {
-        "conventions": as_comments(CONVENTIONS),
+        "conventions": as_comments(conventions(result)),
         "answer": spaced(headline(evaluation)),
         "trust": trust(evaluation).json(),
         "cautions": [spaced(f"{head}: {text}") for head, text in cautions(evaluation)],
@@ -454,7 +454,11 @@ def _write_states(
     result: NavigationRun, record: NavigationRecord, folder: Path, comments: dict[str, str]
 ) -> None:
     """Write a trajectory, its standard deviations, and the estimated sensor errors."""
-    options = FileOptions(ellipsoid=result.ellipsoid, most_points=MOST_POINTS)
+    options = FileOptions(
+        ellipsoid=result.ellipsoid,
+        most_points=MOST_POINTS,
+        heights_as_stated=result.source.heights_as_stated,
+    )
     for form in result.spec.output.files:
         path = folder / f"trajectory.{form}"
         write_trajectory(path, record.trajectory, name=result.source.name, options=options)

@@ -42,7 +42,7 @@ from strapdown.report.navigation_evaluation import (
 )
 from strapdown.report.values import NOT_ESTIMATED, plain
 from strapdown.tables import EULER, NED, POSITION_SD, VELOCITY
-from strapdown.tables.checks import index_of
+from strapdown.tables.checks import height_words, index_of
 from strapdown.tables.on_disk import stored
 
 TIME = "time, s"
@@ -127,13 +127,20 @@ def _bound(record: NavigationRecord, column: str, name: str) -> tuple[str, Array
     return name, TWO_SIDED_95 * record.sd[column].to_numpy(dtype=np.float64), colours[column]
 
 
+def _level(evaluation: NavigationEvaluation) -> str:
+    """Level from which the heights count."""
+    if evaluation.run.source.heights_as_stated:
+        return f"Heights are {height_words(as_stated=True)}."
+    return f"Above the ellipsoid ({evaluation.run.ellipsoid.name})."
+
+
 def height_chart(evaluation: NavigationEvaluation) -> Chart:
-    """Height above the ellipsoid with its bound."""
+    """Height with its bound."""
     panel = _state_panel(evaluation, "alt", "down", "height, m")
     return over_time(
         "height",
         "Height",
-        f"Above the ellipsoid ({evaluation.run.ellipsoid.name}).",
+        _level(evaluation),
         (panel,),
         evaluation.record,
         evaluation.heading_spans,

@@ -59,7 +59,7 @@ from strapdown.report.verdict import integrity_sections, status_words
 from strapdown.rotation import within_half_turn
 from strapdown.systems.navigation_run import NavigationRun, withheld_aid
 from strapdown.tables import EULER, NED, VELOCITY
-from strapdown.tables.checks import index_of
+from strapdown.tables.checks import height_words, index_of
 
 # Outages whose largest bound exceeds the median by less do not limit the result.
 _WORSE = 1.5
@@ -788,7 +788,7 @@ def navigation_document(evaluation: NavigationEvaluation, name: str) -> Document
             *run_again(name),
             folded=True,
         ),
-        section("conventions", "Conventions", Facts(CONVENTIONS), folded=True),
+        section("conventions", "Conventions", Facts(conventions(run)), folded=True),
     )
     title = run.spec.title or f"Navigation of {run.source.name}"
     return Document(
@@ -867,13 +867,21 @@ def _observations(evaluation: NavigationEvaluation) -> tuple[Block | None, ...]:
 # Conventions of the report of a navigation run.
 
 
-CONVENTIONS = (
-    ("Body axes", "forward, right, down; local level: north, east, down"),
-    (
-        "Position",
-        "of the inertial sensors: geodetic latitude north and longitude east in deg, height over "
-        "the ellipsoid in m",
-    ),
+def conventions(run: NavigationRun) -> tuple[tuple[str, str], ...]:
+    """Return axes, signs and levels of what a run states."""
+    height = height_words(as_stated=run.source.heights_as_stated)
+    position = (
+        "of the inertial sensors: geodetic latitude north and longitude east in deg, height "
+        f"{height}, in m"
+    )
+    return (
+        ("Body axes", "forward, right, down; local level: north, east, down"),
+        ("Position", position),
+        *_CONVENTIONS,
+    )
+
+
+_CONVENTIONS = (
     ("Velocity", "relative to the Earth, in m/s: north, east, down"),
     ("Attitude", "roll, pitch, heading (3-2-1): right side down, nose up, clockwise are positive"),
     ("Heading", "from true north, clockwise seen from above"),

@@ -31,7 +31,7 @@ from strapdown.sensors.error_chain import child
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.inputs import refuse_long_span
 from strapdown.tables import GNSS, GYRO
-from strapdown.tables.checks import index_of, source_of, values_of
+from strapdown.tables.checks import HEIGHTS_AS_STATED, index_of, source_of, values_of
 from strapdown.tables.sample_clock import sample_clock
 
 __all__ = [
@@ -80,6 +80,11 @@ class NavigationSource:
     readings: tuple[Reading, ...]
     inputs: tuple[InputFiles, ...]
     findings: tuple[Finding, ...]
+
+    @property
+    def heights_as_stated(self) -> bool:
+        """Whether heights count from the level of the fixes, and not from the ellipsoid."""
+        return any(table.attrs.get(HEIGHTS_AS_STATED) for table in self.tables.values())
 
 
 def read_navigation_source(spec: NavigationSpec) -> NavigationSource:

@@ -266,6 +266,18 @@ NED = ["north", "east", "down"]
 POSITION_SD = ["north_sd", "east_sd", "down_sd"]
 VELOCITY_SD = ["VN_sd", "VE_sd", "VD_sd"]
 REFERENCE = ["time", "kind", "since", *EULER, "turns", "axis", "sd"]
+#: Attribute of Gnss and Trajectory tables whose heights count from the level of the file, which
+#: may be the sea, and not from the ellipsoid.
+HEIGHTS_AS_STATED = "heights_as_stated"
+
+
+def height_words(*, as_stated: bool) -> str:
+    """Level from which heights count, to follow "height"."""
+    if as_stated:
+        return "over the level that the fixes count from (of the sea, say), not the ellipsoid"
+    return "over the ellipsoid"
+
+
 #: Clock of a table (``attrs["clock"]``) whose stamps count from its own start.
 RELATIVE = "relative"
 

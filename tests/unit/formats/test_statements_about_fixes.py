@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import tomllib
@@ -194,6 +195,44 @@ def test_a_run_asks_everything_at_once_and_uses_the_flags(run_cli, drive, monkey
     rows = pd.read_csv(drive / "log-navigate" / "trajectory.csv", comment="#")
     name = next(n for n in rows.columns if n.startswith("alt"))
     assert abs(rows[name].iloc[-1] - 498.5) < 0.3  # three standard deviations of a fix
+
+
+@pytest.mark.parametrize("height", [0.0, 48.5])
+def test_every_output_says_from_which_level_heights_count(run_cli, drive, monkeypatch, height):
+    """Heights kept over the sea were called heights over the ellipsoid in five files."""
+    monkeypatch.chdir(drive)
+    flags = ("--gnss-columns", "time=tick,lat=breite,lon=laenge", "--gnss-units", "time=ms")
+    flags += ("--sensor", "mpu-6050", "--heading", "90", "--gnss-datum-height", f"{height}")
+    done = run_cli("navigate", "log.csv", "--gnss", "fixes.csv", *flags, "--quiet")
+    assert done.code == 0, done.err
+    assert run_cli("convert", "log-navigate", "a.gpx", "--epoch", "2026-05-01T12:00:00Z").code == 0
+    assert run_cli("convert", "log-navigate", "a.kml").code == 0
+    assert run_cli("convert", "log-navigate", "a.nmea", "--epoch", "2026-05-01T12:00:00Z").code == 0
+    out = drive / "log-navigate"
+    facts = json.loads((out / "navigation.json").read_text(encoding="utf-8"))
+    written = {
+        name: path.read_text(encoding="utf-8")
+        for name, path in (
+            ("trajectory", out / "trajectory.csv"),
+            ("gpx", drive / "a.gpx"),
+            ("kml", drive / "a.kml"),
+            ("nmea", drive / "a.nmea"),
+        )
+    }
+    said = [
+        facts["conventions"]["position"],
+        re.search(r"# place: (.*)", written["trajectory"])[1],
+        re.search(r"<desc>(.*)</desc>", written["gpx"])[1],
+        re.search(r"<description>(.*)</description>", written["kml"])[1],
+    ]
+    for text in said:
+        assert ("not the ellipsoid" in text) == (height == 0.0)
+        assert ("WGS 84 ellipsoid" in text or "over the ellipsoid" in text) == (height != 0.0)
+    # Without the height of the geoid it is not claimed to be 0 where heights are over the sea.
+    assert ("<geoidheight>" in written["gpx"]) == (height != 0.0)
+    assert (",M,,M," in written["nmea"]) == (height == 0.0)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert ("Above the ellipsoid" in page) == (height != 0.0)
 
 
 def test_a_form_that_cannot_be_read(run_cli, drive):
