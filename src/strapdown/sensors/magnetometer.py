@@ -39,6 +39,9 @@ TURNED, FIELD_SEEN = 2.0, 3.0
 COVERED = 0.02
 #: Change of direction beside its standard deviation from which a calibration is applied.
 WORTH = 2.0
+#: Most scatter of the calibrated strength beside that of the readings, as shares of their fields: a
+#: center that is moved toward readings that cover little explains none of it.
+STEADIER = 0.9
 #: Direction that iron leaves open and that is worth a warning, deg.
 OPEN = 3.0
 #: A calibration of another log does not fit where the strength scatters more with it than without,
@@ -107,8 +110,9 @@ class MagnetometerCalibration:
 
     @property
     def significant(self) -> bool:
-        """Whether it is found, and by more than what the log leaves open: to be applied."""
-        return self.found and self.change_deg > WORTH * self.direction_sd_deg
+        """Whether it is found, by more than what the log leaves open, and steadies the strength."""
+        steadier = self.residual < STEADIER * self.raw_residual
+        return self.found and steadier and self.change_deg > WORTH * self.direction_sd_deg
 
     def apply(self, mag: ArrayLike) -> Array:
         """Calibrated readings, (n, 3) or (3,); NaN stays NaN."""

@@ -44,6 +44,9 @@ MAX_RATE_CHANGE = 0.0035  # rad/s, 0.2 deg/s
 # What remains beside such a change is a rest where it does not continue it: where the three inner
 # ones of five parts differ by a tenth of that in 8 s at most, beyond noise.
 PARTS_BESIDE, SHARE_BESIDE = 5, 0.1
+# A stretch too short for that is a rest where it changes by a share of its mean rate at most: a
+# turning point of 10 deg/s bends by more within a second, tremor on a bias of some deg/s by less.
+SHARE_OF_MEAN = 0.03
 # The zero-rate output of a low-cost gyro may be off by 20 deg/s (MPU-6050 data sheet, revision 3.4,
 # section 6.1).
 MAX_MEAN_RATE = 0.36  # rad/s
@@ -269,13 +272,18 @@ def _drifts(
 
 
 def _bends(start: Array, slow: Sequence[tuple[Array, Array, float]], first: int, last: int) -> bool:
-    """Whether a run of windows too short for `_drifts` differs at begin, middle and end."""
-    if start[last] - start[first] > 1.5 * LAGS[0]:
+    """Whether a run of windows too short for `_drifts` differs at begin, middle and end.
+
+    By more than a share of the mean rate, which is a bias then, unless it is below 1 deg/s: a hand
+    that keeps still moves by less, the turning point of a motion by more.
+    """
+    rate = float(np.linalg.norm(slow[0][0][first : last + 1].mean(axis=0)))
+    if start[last] - start[first] > 1.5 * LAGS[0] or rate < COULD_TURN:
         return False
     at = np.array([first, (first + last) // 2, last])
-    for mean, sd, most in slow:
+    for (mean, sd, most), of_mean in zip(slow, (SHARE_OF_MEAN * rate, 0.0), strict=False):
         for one, other in itertools.combinations(at, 2):
-            limit = most + 4.0 * math.hypot(sd[one], sd[other])
+            limit = most + of_mean + 4.0 * math.hypot(sd[one], sd[other])
             if np.linalg.norm(mean[other] - mean[one]) > limit:
                 return True
     return False
