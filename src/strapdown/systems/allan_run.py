@@ -28,7 +28,7 @@ from strapdown.progress import Progress, silent
 from strapdown.sensors.allan import allan_model, deviations
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, KEYS
 from strapdown.sensors.noise_terms import ChannelNoise, Shapes, pooled_terms
-from strapdown.sensors.rest import find_rests
+from strapdown.sensors.rest import find_rest_spans
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors, triad_of
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.inputs import Memory, SavedRun, refuse_long_span
@@ -352,20 +352,20 @@ def _rest(imu: pd.DataFrame, name: str, findings: list[Finding]) -> tuple[float,
     """Ends of the longest stationary stretch, s."""
     time = index_of(imu)
     whole = float(time[-1] - time[0])
-    rests = find_rests(imu)
-    longest = max(rests, key=lambda r: r.end - r.start, default=None)
-    length = 0.0 if longest is None else longest.end - longest.start
+    rests = find_rest_spans(imu)
+    begin, end = max(rests, key=lambda span: span[1] - span[0], default=(0.0, 0.0))
+    length = end - begin
     if whole < LEAST_REST:
         raise DataError("allan.too-short-to-rest", file=name, whole=whole, least=LEAST_REST)
-    if longest is None or length < LEAST_REST:
+    if length < LEAST_REST:
         raise DataError(
             "allan.not-at-rest", file=name, longest=length, whole=whole, least=LEAST_REST
         )
     share = length / whole
     if share < 1.0 - MOVED:
-        at = {"start": longest.start, "end": longest.end}
+        at = {"start": begin, "end": end}
         findings.append(_said("allan.moved", name, count=len(rests), share=share, **at))
-    return longest.start, longest.end
+    return begin, end
 
 
 def _temperature(log: LogTable, recording: Recording, stamps: Array) -> Array | None:
