@@ -166,17 +166,18 @@ def _blocks(source: bytes | Path, start: int) -> Iterator[bytes]:
             yield _ended(source[start:stop])
             start = stop
         return
+    size = BLOCK
     with source.open("rb") as stream:
         stream.seek(start)
-        held = b""
-        while block := stream.read(BLOCK):
-            lines, newline, rest = block.rpartition(b"\n")
-            if newline:
-                yield held + lines + newline
-                held = b""
-            held += rest
-        if held:
-            yield _ended(held)
+        while block := stream.read(size):
+            stop = block.rfind(b"\n") + 1
+            if not stop and len(block) == size:
+                size *= 2  # a line longer than that
+            else:
+                yield block[:stop] if stop else _ended(block)
+                start, size = start + (stop or len(block)), BLOCK
+            # What is left of the last line is read again, which copies less than joining it.
+            stream.seek(start)
 
 
 def _ended(lines: bytes) -> bytes:

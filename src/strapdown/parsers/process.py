@@ -41,6 +41,10 @@ ENDINGS = (
     *(".ulg", ".ulog", ".bag", ".mcap", ".db3", ".ubx", ".tlog", ".fit", ".gpx"),
 )
 
+#: Functions that are asked for before any other of a file of an ending: its reading begins beside
+#: the imports.
+FIRST = dict.fromkeys((".parquet", ".pq", ".geoparquet"), "parquet.table")
+
 #: Bytes that pass at a time, where the system can; each time, the two processes take turns.
 PIPE = 1 << 20
 #: Time on a clock for one of the processor: other programs run, too.
@@ -60,6 +64,8 @@ _COMMAND = "import sys; sys.path[:] = {path!r}; from strapdown.parsers.worker im
 
 _lock = threading.RLock()
 _process: subprocess.Popen[bytes] | None = None
+#: A request whose answer nobody has read yet.
+_ahead = b""
 #: Files that ended the process: each is asked for by several formats, and once for each stream.
 _refused: dict[tuple[Any, ...], Finding] = {}
 _MOST_REFUSED = 64
@@ -128,27 +134,32 @@ def parse(
     if known := _refused.get(state):
         raise DataError(known, file=label)
     size = size_of(path)
-    memory = memory or memory_most(size)
-    seconds = seconds_most(size)
-    asked = {
-        "function": function,
-        # The folder of the caller may have changed since the other process started.
-        "path": str(path.absolute()),
-        "arguments": arguments,
-        "memory": memory,
-        "seconds": seconds,
-        "patience": PATIENCE * seconds,
-    }
+    asked = _request(function, path, size, memory, arguments)
     try:
         with _lock:
             answer = _exchange(asked, label, (declared_most(size), text_most(size), room))
-        return _taken(answer, label, memory)
+        return _taken(answer, label, asked["memory"])
     except DataError as error:
         if state and error.finding.code in _LASTING and not error.finding.data.get("on_clock"):
             if len(_refused) >= _MOST_REFUSED:
                 _refused.clear()
             _refused[state] = error.finding
         raise
+
+
+def _request(
+    function: str, path: Path, size: int, memory: int, arguments: dict[str, Any]
+) -> dict[str, Any]:
+    seconds = seconds_most(size)
+    return {
+        "function": function,
+        # The folder of the caller may have changed since the other process started.
+        "path": str(path.absolute()),
+        "arguments": arguments,
+        "memory": memory or memory_most(size),
+        "seconds": seconds,
+        "patience": PATIENCE * seconds,
+    }
 
 
 def _state(path: Path) -> tuple[Any, ...]:
@@ -169,9 +180,30 @@ def start() -> None:
 
 
 def start_for(names: Iterable[str]) -> None:
-    """Start the process now if one of some words is likely the name of a file that needs it."""
-    if any(name.lower().endswith(ENDINGS) for name in names):
-        start()
+    """Start the process now if one of some words is likely the name of a file that needs it.
+
+    If that is the only one, its reading begins, where what is asked for first is known.
+    """
+    files = [Path(name) for name in names if name.lower().endswith(ENDINGS)]
+    if not files:
+        return
+    start()
+    function = FIRST.get(files[0].suffix.lower())
+    if function and len(files) == 1 and files[0].is_file():
+        _ask_ahead(function, files[0])
+
+
+def _ask_ahead(function: str, path: Path) -> None:
+    global _ahead
+    with _lock, contextlib.suppress(OSError, DataError):
+        if not _ahead:
+            line = _line(_request(function, path, size_of(path), 0, {}))
+            _asked(line, path.name)
+            _ahead = line
+
+
+def _line(asked: dict[str, Any]) -> bytes:
+    return json.dumps(asked).encode() + b"\n"
 
 
 def _running() -> subprocess.Popen[bytes]:
@@ -207,9 +239,13 @@ def _exchange(asked: dict[str, Any], label: str, limits: tuple[int, int, Room | 
     """
     from strapdown.parsers import wire
 
-    whole = False
+    global _ahead
+    whole, line = False, _line(asked)
     try:
-        process = _asked(json.dumps(asked).encode() + b"\n", label)
+        if _ahead and _ahead != line:
+            _forget()
+        known, _ahead = _ahead, b""
+        process = _process if known and _process else _asked(line, label)
         with _watched(process, asked["patience"] + LATE) as stream:
             answer = wire.decode(stream, *limits)
         whole = True
@@ -319,8 +355,8 @@ def _taken(answer: Any, label: str, memory: int) -> Any:
 
 def _forget() -> None:
     """End the process, if there is one."""
-    global _process
-    process, _process = _process, None
+    global _ahead, _process
+    process, _process, _ahead = _process, None, b""
     if process is None:
         return
     process.kill()
@@ -333,8 +369,8 @@ def _forget() -> None:
 
 def _after_fork() -> None:
     """Leave the process to the one that started it: its pipes are shared no longer."""
-    global _lock, _process
-    process, _process, _lock = _process, None, threading.RLock()
+    global _ahead, _lock, _process
+    process, _process, _ahead, _lock = _process, None, b"", threading.RLock()
     if process is not None:
         for stream in (process.stdin, process.stdout):
             if stream is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -173,10 +174,14 @@ class _Fit:
         return float(self.variances[self.names.index(name)])
 
 
+#: Covariances of terms on levels, by the geometry of those: of all channels of a log the same.
+Shapes = dict[Any, tuple[dict[Any, list[Array]], dict[Any, list[Array]]]]
+
+
 class _Record:
     """Levels of a record with the covariances of the terms on them, each made once."""
 
-    def __init__(self, levels: tuple[Level, ...]) -> None:
+    def __init__(self, levels: tuple[Level, ...], known: Shapes) -> None:
         self.levels = levels
         # Parts that are not correlated, each by its level and columns; those of nearly one size
         # are one stack of matrices, filled up with ones on the diagonal.
@@ -190,8 +195,8 @@ class _Record:
         self._unit = self._stacked([np.eye(len(one.moments)) for one in levels])
         self._fill = [np.eye(len(unit[0])) - unit for unit in self._unit]
         self._runs = [np.array([float(levels[k].runs) for k, _ in group]) for group in self._alike]
-        self._made: dict[tuple[str, float], list[Array]] = {}
-        self._shapes: dict[tuple[str, float], list[Array]] = {}
+        geometry = tuple((one.block, one.count, one.basis.tobytes()) for one in levels)
+        self._made, self._shapes = known.setdefault(geometry, ({}, {}))
 
     def _stacked(self, every: list[Array]) -> list[Array]:
         out = []
@@ -208,8 +213,9 @@ class _Record:
         key = (term, correlation if term == "GM" else 0.0)
         if key not in self._made:
             if term == "GM" and len(self._made) > 60:
-                self._made = {k: v for k, v in self._made.items() if k[0] != "GM"}
-                self._shapes = {k: v for k, v in self._shapes.items() if k[0] != "GM"}
+                for made in (self._made, self._shapes):
+                    for old in [k for k in made if k[0] == "GM"]:
+                        del made[old]
             self._made[key] = [one.covariance(term, correlation) for one in self.levels]
         return self._made[key]
 
@@ -347,7 +353,10 @@ def noise_terms(rate: ArrayLike, dt: float, temperature: ArrayLike | None = None
 
 
 def pooled_terms(
-    rates: Sequence[ArrayLike], steps: Sequence[float], temperatures: Sequence[ArrayLike | None]
+    rates: Sequence[ArrayLike],
+    steps: Sequence[float],
+    temperatures: Sequence[ArrayLike | None],
+    known: Shapes | None = None,
 ) -> ChannelNoise:
     """Noise terms of a stationary channel from one or more records, by maximum likelihood.
 
@@ -359,6 +368,8 @@ def pooled_terms(
         Sample interval of each.
     temperatures : sequence of array_like, (n,), °C, or None
         The effect is estimated with the noise, and is not part of it.
+    known : dict, optional
+        Kept from one channel to the next of the same records, whose covariances have one shape.
 
     Returns
     -------
@@ -378,13 +389,13 @@ def pooled_terms(
     unit, every = 0.0, list[Level]()
     ends: list[tuple[Array, Array, float]] = []
     for k, (rate, dt, temperature) in enumerate(zip(rates, steps, temperatures, strict=True)):
-        values = np.array(rate, dtype=np.float64)
-        if values.size < LEAST_SAMPLES:
-            raise DataError("allan.too-short", samples=values.size, least=LEAST_SAMPLES)
-        values -= values.mean()
-        white = float(values.var()) * dt
-        if not white > 0.0:
+        given = np.asarray(rate, dtype=np.float64)
+        if given.size < LEAST_SAMPLES:
+            raise DataError("allan.too-short", samples=given.size, least=LEAST_SAMPLES)
+        if not np.ptp(given) > 0.0:
             raise DataError("allan.constant")
+        values = given - given.mean()
+        white = float(values @ values) / values.size * dt
         # In units of its own size, so that no number of the fit depends on the unit.
         unit = unit or math.sqrt(white)
         values /= unit
@@ -396,9 +407,10 @@ def pooled_terms(
         every += own
         ends.append((means, line, block))
     levels, whole = tuple(every), True
+    shapes: Shapes = {} if known is None else known
     span = max(np.size(rate) * dt for rate, dt in zip(rates, steps, strict=True))
     while True:
-        record = _Record(levels)
+        record = _Record(levels, shapes)
         fits = _models(record, steps[0], span, whole)
         best = max(fits, key=lambda one: one.penalized)
         cut = _without_colored(levels, record, best)

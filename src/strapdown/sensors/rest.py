@@ -144,12 +144,30 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
         only if another stretch of the log has a bias that differs by more than 0.01 rad/s; see
         `could_be_a_turn`. Neither is a steady acceleration distinguished from a tilt.
     """
-    time = imu.index.to_numpy(dtype=np.float64)
-    gyro = _triad(imu, GYRO)
+    time, gyro, accel = _signals(imu)
+    return of_one_bias([_stretch(time, gyro, accel, *rows) for rows in _runs_of(time, gyro, accel)])
+
+
+def find_rest_spans(imu: pd.DataFrame) -> tuple[tuple[float, float], ...]:
+    """Begin and end, s, of the rests of `find_rests`, without the statistics of each."""
+    time, gyro, accel = _signals(imu)
+    rows = _runs_of(time, gyro, accel)
+    if len(rows) > 1:  # one has no other to differ from
+        means = [triad_of(_of_columns(np.mean, gyro[a:b])) for a, b in rows]
+        rows = [one for one, same in zip(rows, _share_bias(means), strict=True) if same]
+    return tuple((float(time[a]), float(time[b - 1])) for a, b in rows)
+
+
+def _signals(imu: pd.DataFrame) -> tuple[Array, Array, Array | None]:
     accel = _triad(imu, ACCEL) if set(ACCEL) <= set(imu.columns) else None
+    return imu.index.to_numpy(dtype=np.float64), _triad(imu, GYRO), accel
+
+
+def _runs_of(time: Array, gyro: Array, accel: Array | None) -> list[tuple[int, int]]:
+    """First and one-past-last sample of each stationary stretch."""
     starts, ends = _windows(time)
     if not len(starts):
-        return ()
+        return []
     rate, variance = _window_moments(gyro, starts, ends)
     gyro_sd = np.sqrt(variance.sum(axis=1))
     quiet = max(QUIET_FACTOR * float(np.quantile(gyro_sd, QUIET_QUANTILE)), ROUNDING)
@@ -165,14 +183,13 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
         slow.append((force, sd, MAX_ACCEL_CHANGE))
     drifts = _drifts(begins, slow, still)
     joined = begins[1:] - time[ends[:-1] - 1] < LEAST_LENGTH
-    rests = [
-        _stretch(time, gyro, accel, int(starts[a]), int(ends[b]))
+    return [
+        (int(starts[a]), int(ends[b]))
         for a, b in _runs(still & ~drifts, joined)
         if time[ends[b] - 1] - begins[a] >= LEAST_LENGTH
         and not _bends(begins, slow, a, b)
         and not _continues(begins, slow, drifts, np.arange(a, b + 1))
     ]
-    return of_one_bias(rests)
 
 
 def _windows(time: Array) -> tuple[Indices, Indices]:
@@ -452,12 +469,16 @@ def _moments(time: Array, values: Array) -> tuple[Triple, Triple, Triple]:
 
 def of_one_bias(rests: list[RestStretch]) -> tuple[RestStretch, ...]:
     """Select rests whose bias agrees with the smallest; a steady slow rotation is not a rest."""
-    if not rests:
-        return ()
-    least = min(rests, key=lambda r: float(np.linalg.norm(r.gyro_mean)))
-    return tuple(
-        r for r in rests if np.linalg.norm(np.subtract(r.gyro_mean, least.gyro_mean)) <= SAME_BIAS
-    )
+    alike = _share_bias([r.gyro_mean for r in rests])
+    return tuple(r for r, same in zip(rests, alike, strict=True) if same)
+
+
+def _share_bias(means: Sequence[Triple]) -> list[bool]:
+    """Whether the mean rate of each rest agrees with the smallest."""
+    if not means:
+        return []
+    least = min(means, key=lambda mean: float(np.linalg.norm(mean)))
+    return [bool(np.linalg.norm(np.subtract(mean, least)) <= SAME_BIAS) for mean in means]
 
 
 # Stationary but vibrating: a parked car with people in it, a sensor on a running machine.

@@ -7,7 +7,7 @@ import shutil
 import tempfile
 import weakref
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -27,8 +27,8 @@ from strapdown.formats.recording import Recording
 from strapdown.progress import Progress, silent
 from strapdown.sensors.allan import allan_model, deviations
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, KEYS
-from strapdown.sensors.noise_terms import ChannelNoise, pooled_terms
-from strapdown.sensors.rest import find_rests
+from strapdown.sensors.noise_terms import ChannelNoise, Shapes, pooled_terms
+from strapdown.sensors.rest import find_rest_spans
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors, triad_of
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.inputs import Memory, SavedRun, refuse_long_span
@@ -240,41 +240,40 @@ def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
         the first, or a channel is constant.
     """
     findings: list[Finding] = []
-    rests = []
-    for k, log in enumerate(spec.logs):
-        progress("reading", 0.05 + 0.15 * k / len(spec.logs))
-        rests.append(_rest_of(spec, log, findings))
-    dt, name = rests[0].dt, rests[0].name
-    channels = [c for c in (*GYRO, *ACCEL) if c in rests[0].imu.columns]
-    for rest in rests[1:]:
-        if abs(rest.dt / dt - 1.0) > SAME_RATE or not set(channels) <= set(rest.imu.columns):
-            raise DataError(
-                "allan.logs-differ",
-                file=rest.name,
-                rate=1.0 / rest.dt,
-                first=1.0 / dt,
-                name=name,
-                channels=[c for c in channels if c not in rest.imu.columns],
-            )
+    rests: list[_Rest] = []
     noise: dict[str, ChannelNoise] = {}
-    means: list[dict[str, float]] = [{} for _ in rests]
     tables = []
-
-    def deviations_of(channel: str) -> pd.DataFrame:
-        return deviations([rest.values(channel) for rest in rests], dt)
-
-    # Beside the fits, as these need no lock of Python; no bit depends on it.
+    # Threads beside the fits and the search for rests, for what needs no lock of Python; no bit
+    # depends on them.
     with ThreadPoolExecutor(BESIDE) as beside:
+        for k, log in enumerate(spec.logs):
+            progress("reading", 0.05 + 0.15 * k / len(spec.logs))
+            rests.append(_rest_of(spec, log, findings, beside))
+        dt, name = rests[0].dt, rests[0].name
+        channels = [c for c in (*GYRO, *ACCEL) if c in rests[0].imu.columns]
+        for rest in rests[1:]:
+            if abs(rest.dt / dt - 1.0) > SAME_RATE or not set(channels) <= set(rest.imu.columns):
+                raise DataError(
+                    "allan.logs-differ",
+                    file=rest.name,
+                    rate=1.0 / rest.dt,
+                    first=1.0 / dt,
+                    name=name,
+                    channels=[c for c in channels if c not in rest.imu.columns],
+                )
+        means: list[dict[str, float]] = [{} for _ in rests]
+        steps, warm = [one.dt for one in rests], [one.warm for one in rests]
+        shapes: Shapes = {}
+
+        def deviations_of(channel: str) -> pd.DataFrame:
+            return deviations([rest.values(channel) for rest in rests], dt)
+
         made = {channel: beside.submit(deviations_of, channel) for channel in channels}
-        inputs = [
-            beside.submit(log_files, log.path, one.files, log.calibration)
-            for log, one in zip(spec.logs, rests, strict=True)
-        ]
         for k, channel in enumerate(channels):
             progress(f"noise of {channel}", 0.2 + 0.55 * k / len(channels))
             values = [rest.values(channel) for rest in rests]
             try:
-                found = pooled_terms(values, [one.dt for one in rests], [one.warm for one in rests])
+                found = pooled_terms(values, steps, warm, shapes)
             except DataError as error:
                 raise error.replaced(file=name, quantity=channel) from None
             noise[channel] = found
@@ -300,16 +299,16 @@ def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
             for one, mean in zip(rests, means, strict=True)
         ),
         1.0 / dt,
-        tuple(file for one in inputs for file in one.result()),
+        tuple(file for one in rests for file in one.inputs.result()),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Rest:
-    """Stationary part of a log: its rows, sample interval in s, and temperature in °C."""
+    """Stationary part of a log: its files, rows, sample interval in s, and temperature in °C."""
 
     name: str
-    files: tuple[Path, ...]
+    inputs: Future[tuple[InputFiles, ...]]
     imu: pd.DataFrame
     rows: slice
     start: float
@@ -322,9 +321,12 @@ class _Rest:
         return np.ascontiguousarray(self.imu[channel].to_numpy()[self.rows], dtype=np.float64)
 
 
-def _rest_of(spec: AllanSpec, log: LogTable, findings: list[Finding]) -> _Rest:
+def _rest_of(
+    spec: AllanSpec, log: LogTable, findings: list[Finding], beside: ThreadPoolExecutor
+) -> _Rest:
     """Read a log and find its rest; findings are appended."""
     recording, imu, read = body_record(log, AxesTable(axes=spec.axes))
+    inputs = beside.submit(log_files, log.path, recording.files, log.calibration)
     refuse_long_span(imu, recording.name)
     time = index_of(imu)
     start, end = float(time[0]), float(time[-1])
@@ -343,27 +345,27 @@ def _rest_of(spec: AllanSpec, log: LogTable, findings: list[Finding]) -> _Rest:
         longest = max(gap.end - gap.start for gap in gaps)
         findings.append(_said("allan.gaps", recording.name, count=len(gaps), longest=longest))
     rows = slice(int(first), int(past))
-    return _Rest(recording.name, recording.files, imu, rows, start, end, dt, warm)
+    return _Rest(recording.name, inputs, imu, rows, start, end, dt, warm)
 
 
 def _rest(imu: pd.DataFrame, name: str, findings: list[Finding]) -> tuple[float, float]:
     """Ends of the longest stationary stretch, s."""
     time = index_of(imu)
     whole = float(time[-1] - time[0])
-    rests = find_rests(imu)
-    longest = max(rests, key=lambda r: r.end - r.start, default=None)
-    length = 0.0 if longest is None else longest.end - longest.start
+    rests = find_rest_spans(imu)
+    begin, end = max(rests, key=lambda span: span[1] - span[0], default=(0.0, 0.0))
+    length = end - begin
     if whole < LEAST_REST:
         raise DataError("allan.too-short-to-rest", file=name, whole=whole, least=LEAST_REST)
-    if longest is None or length < LEAST_REST:
+    if length < LEAST_REST:
         raise DataError(
             "allan.not-at-rest", file=name, longest=length, whole=whole, least=LEAST_REST
         )
     share = length / whole
     if share < 1.0 - MOVED:
-        at = {"start": longest.start, "end": longest.end}
+        at = {"start": begin, "end": end}
         findings.append(_said("allan.moved", name, count=len(rests), share=share, **at))
-    return longest.start, longest.end
+    return begin, end
 
 
 def _temperature(log: LogTable, recording: Recording, stamps: Array) -> Array | None:

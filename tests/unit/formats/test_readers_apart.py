@@ -275,6 +275,34 @@ def test_a_text_table_needs_none(tmp_path, monkeypatch):
     assert started
 
 
+def test_the_only_file_of_a_command_is_read_beside_the_imports(tmp_path, log, monkeypatch):
+    """Asked for once; another file that is asked for in between gets its own answer."""
+    path = tmp_path / "log.parquet"
+    pd.DataFrame({"time_s": np.arange(90.0), "gyro_x": np.arange(90.0)}).to_parquet(path)
+    lines, asked = [], process._asked
+
+    def noted(line, label):
+        lines.append(line)
+        return asked(line, label)
+
+    monkeypatch.setattr(process, "_asked", noted)
+    process._forget()
+    start_for(["allan", str(path), "--out", "of-log"])
+    assert len(lines) == 1
+    begun = running().pid
+    for _ in range(2):
+        assert read_raw(path).columns["time_s"].size == 90
+    assert running().pid == begun
+    assert len(lines) == 2
+    start_for(["allan", str(path)])
+    assert read_raw(log).columns["time_s"].size == 60
+    assert read_raw(path).columns["time_s"].size == 90
+    lines.clear()
+    for names in ([str(path), str(log)], [str(log)], [str(tmp_path / "missing.parquet")]):
+        start_for(["allan", *names])
+    assert not lines
+
+
 @linux
 def test_none_is_left_when_its_caller_is_killed(tmp_path, log, fifo):
     """Neither an idle one nor one that parses."""

@@ -7,7 +7,7 @@ import pytest
 from tests.coded import coded
 
 from strapdown.errors import DataError
-from strapdown.formats import csv, read_log, read_raw
+from strapdown.formats import csv, read_log, read_raw, text_columns
 from strapdown.formats.arrays import excel_nanoseconds, nanoseconds_of
 from strapdown.formats.clocks import counted
 from strapdown.formats.preamble import stated_rate, stated_units
@@ -351,3 +351,17 @@ def test_a_preamble_filled_up_with_separators(tmp_path):
         assert raw.columns["gz"].tolist() == [3.25] * 20
         assert raw.units.get("gx") == ("deg/s" if units[0] in lines else None)
         assert raw.row(0) == len(lines) - 19
+
+
+@pytest.mark.parametrize("end", ["", "\n", "\n7,8"])
+@pytest.mark.parametrize("wide", [3, 70])
+def test_blocks_of_a_file_are_its_whole_lines(tmp_path, monkeypatch, wide, end):
+    """Each byte once, also of lines longer than a block, and of a last one without a break."""
+    monkeypatch.setattr(text_columns, "BLOCK", 32)
+    path = tmp_path / "log.csv"
+    text = "head\n" + "\n".join(f"{k:0{wide}},{k}" for k in range(40)) + end
+    path.write_bytes(text.encode())
+    blocks = list(text_columns._blocks(path, 5))
+    assert b"".join(blocks).decode() == text[5:].rstrip("\n") + "\n"
+    assert all(block.endswith(b"\n") for block in blocks)
+    assert len(blocks) > 5

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from strapdown._kernels.allan import CHUNK
+from strapdown._kernels.allan import CHUNK, overlapping_variances
+from strapdown._kernels.compilation import interpreted
 from strapdown.errors import DataError
 from strapdown.sensors.allan import (
     allan_model,
@@ -236,13 +237,39 @@ def test_noise_colored_by_a_filter_is_left_out():
     assert found.term("N").value == pytest.approx(1e-3, rel=0.05)
 
 
+def test_channels_that_share_the_covariances_have_their_own_noise_to_the_bit():
+    known = {}
+    for seed in (4, 5):
+        rate, dt = simulated(seed, noise_density=1e-3, random_walk=1e-4)
+        alone, shared = noise_terms(rate, dt), pooled_terms([rate], [dt], [None], known)
+        assert repr(shared.terms) == repr(alone.terms)
+    assert len(known) == 1
+    longer = np.append(rate, rate)
+    assert repr(pooled_terms([longer], [dt], [None], known).terms) == repr(
+        noise_terms(longer, dt).terms
+    )
+    assert len(known) == 2
+
+
+@pytest.mark.parametrize("count", [100, 2 * CHUNK + 77])
+def test_the_compiled_kernel_has_the_bits_of_its_source(count):
+    phase = np.append(0.0, np.cumsum(np.random.default_rng(3).standard_normal(count)))
+    factors = np.array([1, 3, 8, 33, 49])
+    compiled, source = np.empty((5, 6)), np.empty((5, 6))
+    overlapping_variances(phase, factors, compiled)
+    interpreted(overlapping_variances)(phase, factors, source)
+    assert (compiled == source).all()
+
+
 def test_a_record_that_is_too_short_or_constant_is_refused():
     with pytest.raises(DataError) as refused:
         noise_terms(np.zeros(100), 0.01)
     assert refused.value.finding.code == "allan.too-short"
-    with pytest.raises(DataError) as refused:
-        noise_terms(np.ones(2000), 0.01)
-    assert refused.value.finding.code == "allan.constant"
+    # A tenth is no binary fraction: the mean of many differs from each by rounding.
+    for value in (1.0, 0.1):
+        with pytest.raises(DataError) as refused:
+            noise_terms(np.full(2003, value), 0.01)
+        assert refused.value.finding.code == "allan.constant"
 
 
 @pytest.mark.parametrize("count", [900, 4001, 60_000])

@@ -8,6 +8,7 @@ import pytest
 
 from strapdown.sensors.rest import (
     could_be_a_turn,
+    find_rest_spans,
     find_rests,
     find_rests_of_every_grade,
     sd_of_mean,
@@ -255,3 +256,21 @@ def test_a_sine_has_no_rest_at_its_turning_points():
     """
     found = [seed for seed in range(300) if find_rests_of_every_grade(textbook(seed))]
     assert len(found) <= 3
+
+
+@pytest.mark.parametrize("accel", [False, True])
+def test_spans_are_those_of_the_rests(accel):
+    """Of one rest, of two that share their bias, of none, and of a steady turn beside a rest."""
+    tables = [
+        log(100, 2e-3, [(6.0, 20.0)], accel=accel),
+        log(100, 2e-3, [(0.0, 4.0), (9.0, 14.0)], accel=accel),
+        log(100, 2e-3, [(0.0, 20.0)], accel=accel),
+    ]
+    turning = log(100, 2e-3, [(8.0, 12.0)], accel=accel)
+    turning.loc[13.0:, "gyro_z"] += 0.05
+    counts = []
+    for table in (*tables, turning):
+        rests = find_rests(table)
+        counts.append(len(rests))
+        assert find_rest_spans(table) == tuple((r.start, r.end) for r in rests)
+    assert counts == [1, 2, 0, 1]
