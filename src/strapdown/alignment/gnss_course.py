@@ -206,6 +206,8 @@ class GnssCourse(CoarseAlignment):
 SIGN = np.where(OF_SENSORS.start > HANDED, 1.0, -1.0)
 # Prior standard deviations of an unknown velocity, m/s, and of an unknown attitude, rad.
 UNKNOWN = (100.0, 3.0)
+# Rows of the biases in all covariances.
+BIASES = np.arange(GYRO_BIAS.start, ACCEL_BIAS.stop)
 # Prior standard deviation of the position at the end, m, against that by the newest fixes.
 UNKNOWN_PLACE = 1e4
 # The scatter of the fixes is judged from so many velocities beyond the number of unknowns.
@@ -365,6 +367,7 @@ class CourseFit:
             shift = np.eye(len(inverse))
             shift[END_PLACE, OFFSET] = found.velocity + x[END_VELOCITY]
             inverse = shift @ inverse @ shift.T
+        inverse = self._at_an_end(inverse, seen.sums)
         return CourseEstimate(
             rotation.dcm_from_rotation_vector(x[TURN]) @ found.C,
             found.velocity + x[END_VELOCITY],
@@ -475,7 +478,7 @@ class CourseFit:
         J[len(HANDED) :] = -by_at
         # The shift by a wrong clock is left to the owner of that error.
         J[:, OFFSET] = 0.0
-        covariance = J @ inverse @ J.T
+        covariance = self._at_an_end(J @ inverse @ J.T, seen.sums)
         covariance[len(HANDED) :, len(HANDED) :] += np.diag(own)
         state = CourseEstimate(
             seen.C[here],
@@ -640,6 +643,16 @@ class CourseFit:
         by_arm = -(rotation.cross_matrix(arm) @ turns[rows])
         by_arm[:, :, ARM] = axes
         return arm, by_arm
+
+    def _at_an_end(self, covariance: Array, sums: DriveSums) -> Array:
+        """Covariance with the biases at an end of the record, instead of their means over it.
+
+        A random walk there differs from its mean by a third of the variance of its change.
+        """
+        out, length = covariance.copy(), float(sums.stretch.sum())
+        drifts = self.sensors.gyro_drift, self.sensors.accel_drift
+        out[BIASES, BIASES] += np.concatenate([drift.moved(length) for drift in drifts]) / 3.0
+        return out
 
     def _walk(self, sums: DriveSums) -> float:
         """Variance of a position within stretches, whose noise is modeled as a bias of each.

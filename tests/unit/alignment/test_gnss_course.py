@@ -22,6 +22,7 @@ from strapdown.alignment.course_sums import ARM, END_VELOCITY, OF_SENSORS, TURN,
 from strapdown.alignment.gnss_course import GnssCourse, _excess
 from strapdown.errors import ConfigError, DataError
 from strapdown.frames import ned_from_geodetic
+from strapdown.navigation.navigator import Warming
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
@@ -457,6 +458,30 @@ def test_tilts_of_units_far_outside_their_data_sheet_are_as_stated(times):
         inside += square < chi2.isf(0.05, 2)
     low, high = binom.ppf([0.005, 0.995], SIXTY, 0.95)
     assert low <= inside <= high
+
+
+@pytest.mark.slow
+def test_attitudes_of_units_that_warm_up_are_as_stated():
+    """Gyros drift by 0.1 deg/s until they are warm: at both ends of 60 drives, as above."""
+    warming = Warming(np.radians(0.1), 0.02, 60.0)
+    way = replace(NO_SLIP, backtrack=True)
+    inside = np.zeros(2, dtype=int)
+    for seed in range(SIXTY):
+        imu, truth, sensors = unit(DRIVE, 50.0, seed, "icm-20602")
+        warm = 1.0 - np.exp(-imu.index.to_numpy() / 60.0)
+        change = np.random.default_rng(seed).normal(size=(2, 3))
+        warmed = imu.copy()
+        warmed.attrs = dict(imu.attrs)
+        for names, of, size in ((GYRO, 0, warming.gyro), (ACCEL, 1, warming.accel)):
+            warmed[names] = imu[names].to_numpy() + size * warm[:, None] * change[of]
+        known = warming.within(sensors, 0.0, float(imu.index[-1]))
+        found = way.align(warmed, SITE, known, fixes(seed, noise=0.1, rate=1.0))
+        for k, (one, at) in enumerate(((found, -1), (found.earlier, 0))):
+            inside[k] += chi_square(one, truth[at]) < chi2.isf(0.05, 3)
+    low, high = binom.ppf([0.005, 0.995], SIXTY, 0.95)
+    assert (inside >= low).all()
+    # At the first sample a tenth of the weight of the fixes leaves wider bounds.
+    assert inside[0] <= high
 
 
 @pytest.mark.parametrize("current", [(0.0, 0.0), (1.5, -1.0)])
