@@ -206,12 +206,16 @@ class GnssCourse(CoarseAlignment):
 SIGN = np.where(OF_SENSORS.start > HANDED, 1.0, -1.0)
 # Prior standard deviations of an unknown velocity, m/s, and of an unknown attitude, rad.
 UNKNOWN = (100.0, 3.0)
+# Rows of the biases in all covariances.
+BIASES = np.arange(GYRO_BIAS.start, ACCEL_BIAS.stop)
 # Prior standard deviation of the position at the end, m, against that by the newest fixes.
 UNKNOWN_PLACE = 1e4
 # The scatter of the fixes is judged from so many velocities beyond the number of unknowns.
 LEAST_FREE = 12.0
 # Number of updates of weights and scale with one linearization.
 SWEEPS = 3
+# Degrees of freedom of the biases of the units of a type, and a factor that counts as one.
+FREEDOM, NEAR = 4.0, 1.05
 # Share of the weight of fixes and rests in a state from which a filter meets them again.
 ONCE = 0.1
 # Number of first positions, the first of which to agree with the others gives the position.
@@ -257,7 +261,8 @@ class CourseEstimate:
     share of the courses that agree with the assumed direction of driving. `slip`: factor of the
     variance of the courses over that stated; at least 1. `place` ((3,), m): of
     positions alone, at the end; its covariance follows the 39 rows. `offset` (s): of the stamps of
-    the fixes from those that were taken, later is positive, and its standard deviation.
+    the fixes from those that were taken, later is positive, and its standard deviation. `beyond`:
+    factor of the biases of the accelerometers over their stated sd; at least 1.
     """
 
     C: Array
@@ -271,6 +276,7 @@ class CourseEstimate:
     slip: float = 1.0
     place: Array = field(default_factory=lambda: np.zeros(3))
     offset: tuple[float, float] = (0.0, 0.0)
+    beyond: float = 1.0
 
     @property
     def bias(self) -> Array:
@@ -361,6 +367,7 @@ class CourseFit:
             shift = np.eye(len(inverse))
             shift[END_PLACE, OFFSET] = found.velocity + x[END_VELOCITY]
             inverse = shift @ inverse @ shift.T
+        inverse = self._at_an_end(inverse, seen.sums)
         return CourseEstimate(
             rotation.dcm_from_rotation_vector(x[TURN]) @ found.C,
             found.velocity + x[END_VELOCITY],
@@ -373,6 +380,7 @@ class CourseFit:
             slip,
             found.place + x[END_PLACE] if self.by_places else found.place,
             offset,
+            found.beyond,
         )
 
     def _observed(self, found: CourseEstimate, more: ArrayLike = ()) -> Observed:
@@ -470,7 +478,7 @@ class CourseFit:
         J[len(HANDED) :] = -by_at
         # The shift by a wrong clock is left to the owner of that error.
         J[:, OFFSET] = 0.0
-        covariance = J @ inverse @ J.T
+        covariance = self._at_an_end(J @ inverse @ J.T, seen.sums)
         covariance[len(HANDED) :, len(HANDED) :] += np.diag(own)
         state = CourseEstimate(
             seen.C[here],
@@ -526,8 +534,7 @@ class CourseFit:
         still = self.sensors.gyro_bias_variance()
         still = still + np.square(gyro.axis("g_sensitivity")) * float(force @ force)
         sd[GYRO_BIAS] = np.sqrt(still + gyro.variance_by_input(rate))
-        still = self.sensors.accel_bias_variance()
-        sd[ACCEL_BIAS] = np.sqrt(still + accel.variance_by_input(force))
+        sd[ACCEL_BIAS] = found.beyond * np.sqrt(self._accel_variance(found))
         apart = np.sqrt(np.maximum(sums.stretch, 1e-9))[:, None]
         for triad, drift, matrix, noise in (
             (gyro, self.sensors.gyro_drift, GYRO_MATRIX, GYRO_NOISE),
@@ -636,6 +643,16 @@ class CourseFit:
         by_arm = -(rotation.cross_matrix(arm) @ turns[rows])
         by_arm[:, :, ARM] = axes
         return arm, by_arm
+
+    def _at_an_end(self, covariance: Array, sums: DriveSums) -> Array:
+        """Covariance with the biases at an end of the record, instead of their means over it.
+
+        A random walk there differs from its mean by a third of the variance of its change.
+        """
+        out, length = covariance.copy(), float(sums.stretch.sum())
+        drifts = self.sensors.gyro_drift, self.sensors.accel_drift
+        out[BIASES, BIASES] += np.concatenate([drift.moved(length) for drift in drifts]) / 3.0
+        return out
 
     def _walk(self, sums: DriveSums) -> float:
         """Variance of a position within stretches, whose noise is modeled as a bias of each.
@@ -746,6 +763,11 @@ class CourseFit:
             sd = float(np.sqrt(np.diagonal(found.covariance)[6:9].max()))
             length = max(GROWTH * length, LINEAR / max(sd, 1e-12))
         found = _converged(fit, found, Igg3())
+        for _ in range(SWEEPS):
+            before, found = found.beyond, replace(found, beyond=fit.beyond(found))
+            if found.beyond <= NEAR * before:
+                break
+            found = _converged(fit, found, Igg3())
         if found.onward < MOST:
             raise DataError(
                 "alignment.course-contradicts-forward",
@@ -755,6 +777,24 @@ class CourseFit:
                 onward=1.0 - found.onward,
             )
         return found
+
+    def beyond(self, found: CourseEstimate) -> float:
+        """Factor of the biases of the accelerometers over their stated standard deviation.
+
+        A data sheet states that of a type: a unit, soldered, aged and warm, may lie far outside,
+        and then all its axes may. Student's t distribution of `FREEDOM` for the three together: an
+        expectation step for the factor, by the biases and what they are unsure of.
+        """
+        known = self._accel_variance(found)
+        square = np.square(found.bias[3:]) + np.diagonal(found.covariance)[ACCEL_BIAS]
+        part = np.divide(square, known, out=np.zeros(3), where=known > 0.0)
+        return max(1.0, math.sqrt((FREEDOM + float(part.sum())) / (FREEDOM + 3.0)))
+
+    def _accel_variance(self, found: CourseEstimate) -> Array:
+        """Stated variances of the accelerometer biases at the mean input, (3,)."""
+        accel = self.sensors.accel
+        force = self.means[3:] - found.bias[3:]
+        return self.sensors.accel_bias_variance() + accel.variance_by_input(force)
 
     def _bias_of_rests(self) -> tuple[Array, float]:
         """Bias of the gyros from the rests, and the largest standard deviation."""

@@ -100,22 +100,24 @@ def align(chain: NavigationPipeline, state: PipelineState) -> Aligned:
     """
     mode = chain.modes[state.mode]
     assert chain.sensors is not None
-    imu = _steps(chain, state)
+    imu, sensors, warming = _steps(chain, state), chain.sensors, chain.navigator.warming
+    if warming is not None:
+        sensors = warming.within(sensors, float(imu.index[0]), float(imu.index[-1]))
     if isinstance(mode, FineMode):
         kept = _window(chain, state)
         assert state.aligned is not None
         coarse = state.aligned.alignment
         site, _ = _site(chain, state, coarse.q_nb)
         increments = _table(kept[1:, 7:17], kept[1:, 0], MOTION, state)
-        fine = mode.way.align(imu, site, chain.sensors, coarse, increments=increments)
+        fine = mode.way.align(imu, site, sensors, coarse, increments=increments)
         return Aligned(mode.name, state.begun, state.time, fine.alignment, fine)
     assert isinstance(mode, CoarseMode)
     site, _ = _site(chain, state, None)
     if isinstance(mode.way, GnssCourse):
         fixes, antenna = _fixes(chain, state), _antenna(chain)
-        found = mode.way.align(imu, site, chain.sensors, fixes, antenna)
+        found = mode.way.align(imu, site, sensors, fixes, antenna)
     else:
-        found = mode.way.align(imu, site, chain.sensors, _fixes(chain, state))
+        found = mode.way.align(imu, site, sensors, _fixes(chain, state))
     return Aligned(mode.name, state.begun, state.time, found)
 
 

@@ -71,6 +71,8 @@ from strapdown.navigation.record import (
     NavigationChunk,
 )
 from strapdown.navigation.recovery import Wrong
+from strapdown.sensors.triad_errors import triad_of
+from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty
 
 if TYPE_CHECKING:
     from strapdown.navigation.smoother import RauchTungStriebel
@@ -159,6 +161,20 @@ class Warming:
         left = [math.exp(-2.0 * max(t - self.since(begun), 0.0) / self.time) for t in (told, time)]
         share = left[0] - left[1]
         return {"gyro_bias": share * self.gyro**2, "accel_bias": share * self.accel**2}
+
+    def within(self, sensors: ImuUncertainty, begin: float, end: float) -> ImuUncertainty:
+        """Uncertainty of sensors over a time in which they warm up: as if they walked evenly."""
+        share = self.variances(begin, end, begin)
+
+        def walked(drift: BiasDrift, variance: float) -> BiasDrift:
+            steps = np.sqrt(np.square(drift.steps) + variance / max(end - begin, SAME_INSTANT))
+            return replace(drift, walk=triad_of(steps))
+
+        return replace(
+            sensors,
+            gyro_drift=walked(sensors.gyro_drift, share["gyro_bias"]),
+            accel_drift=walked(sensors.accel_drift, share["accel_bias"]),
+        )
 
 
 @dataclass(frozen=True)

@@ -48,6 +48,7 @@ from strapdown.navigation.measurements.gnss_readiness import (
     white_velocity_sd,
     without_repeats,
 )
+from strapdown.navigation.navigator import Warming
 from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
 from strapdown.sensors.rest import LEAST_LENGTH, find_rests_of_every_grade
@@ -306,7 +307,8 @@ def propose(
             clock["clock_unsure_s"] = tuple((round(at, 3), sd) for at, sd in unsure)
     if fixes is not None and sensors is not None and chosen["coarse"]["kind"] == "gnss_course":
         progress("trying alignments", 0.7)
-        chosen, how, tried = _tried(chosen, how, imu, fixes, sensors, levelled, clock)
+        known = sensors, _as_warming(table["sensors"].get("warming"))
+        chosen, how, tried = _tried(chosen, how, imu, fixes, known, levelled, clock)
         findings = (*findings, *tried)
     table |= chosen
     if fixes is not None:
@@ -411,6 +413,14 @@ def _warming(named: str) -> dict[str, Any]:
     if (sds := WARMING.get(load_sensor(named).grade)) is None:
         return {}
     return {"warming": {"gyro_sd_deg_per_h": sds[0], "accel_sd_ug": sds[1], "time_s": WARM}}
+
+
+def _as_warming(stated: dict[str, float] | None) -> Warming | None:
+    """Change of the biases by the keys of `_warming`, in SI."""
+    if stated is None:
+        return None
+    gyro = stated["gyro_sd_deg_per_h"] / DEG_PER_HOUR
+    return Warming(gyro, 1e-6 * STANDARD_GRAVITY * stated["accel_sd_ug"], stated["time_s"])
 
 
 def _rest_bias(
@@ -715,8 +725,11 @@ def _change_in_sd(fixes: pd.DataFrame) -> float:
     if len(v) <= steps:
         return 0.0
     usual, apart = float(np.median(sd[stated])), (time[steps:] - time[:-steps])[:, None]
-    # Without the change by their own noise.
-    square = float(np.mean((np.square(v[steps:] - v[:-steps]) - 2.0 * usual**2) / apart**2))
+    # Without the change by their own noise, which an assumed one may far exceed.
+    noise = usual
+    if "velocity_sd_taken" in fixes.attrs:
+        noise = min(usual, white_velocity_sd(fixes) or usual)
+    square = float(np.mean((np.square(v[steps:] - v[:-steps]) - 2.0 * noise**2) / apart**2))
     return math.sqrt(max(square, 0.0) * len(v)) / usual
 
 
@@ -795,14 +808,14 @@ def _tried(
     how: str,
     imu: pd.DataFrame,
     fixes: pd.DataFrame,
-    sensors: ImuUncertainty,
+    known: tuple[ImuUncertainty, Warming | None],
     levelled: float,
     clock: dict[str, float],
 ) -> tuple[dict[str, Any], str, tuple[Finding, ...]]:
     """An alignment by course with limits that the record meets, by trial at some instants.
 
-    `clock`: offset and delay of the fixes. If no instant allows an alignment, the heading is asked,
-    and a finding gives the reason.
+    `known`: of the sensors, and how they warm up. `clock`: offset and delay of the fixes. If no
+    instant allows an alignment, the heading is asked, and a finding gives the reason.
     """
     coarse, antenna = chosen["coarse"], _antenna(clock)
     limits = coarse["until_heading_sd_deg"], coarse["until_tilt_sd_deg"]
@@ -814,8 +827,11 @@ def _tried(
     def after(length: float) -> tuple[float, float]:
         """Standard deviations of heading and tilt of an alignment at this time, deg."""
         begin, end = np.searchsorted(time, time[0] + np.array([length - MOST_BACK, length]) + 1e-7)
-        way = GnssCourse(backtrack=True)
-        found = way.align(imu.iloc[begin:end], site, sensors, fixes, antenna)
+        way, part = GnssCourse(backtrack=True), imu.iloc[begin:end]
+        sensors, warming = known
+        if warming is not None:
+            sensors = warming.within(sensors, float(part.index[0]), float(part.index[-1]))
+        found = way.align(part, site, sensors, fixes, antenna)
         roll, pitch, heading = np.maximum(found.sd_deg_to_begin, found.sd_deg).tolist()
         return heading, max(roll, pitch)
 

@@ -22,6 +22,7 @@ from strapdown.alignment.course_sums import ARM, END_VELOCITY, OF_SENSORS, TURN,
 from strapdown.alignment.gnss_course import GnssCourse, _excess
 from strapdown.errors import ConfigError, DataError
 from strapdown.frames import ned_from_geodetic
+from strapdown.navigation.navigator import Warming
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
@@ -42,7 +43,7 @@ DRIVE = PathMotion(
     sway_pitch=0.3,
 )
 NO_SLIP = GnssCourse(mounting_yaw_sd_deg=0.0, sideslip_sd_deg=0.001, axle_sd=0.0)
-RUNS = 12
+RUNS, SIXTY = 12, 60
 
 
 def fixes(seed=0, motion=DRIVE, noise=0.05, rate=5.0, place_noise=1.0):
@@ -435,6 +436,52 @@ def test_errors_at_the_first_sample_are_as_stated(positions, monkeypatch):
     low, high = chi2.isf([0.995, 0.005], 9 * RUNS)
     assert low < sum(nees(found)) < high
     assert 0.1 * low < sum(nees(least)) < high
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("times", [1.0, 4.0])
+def test_tilts_of_units_far_outside_their_data_sheet_are_as_stated(times):
+    """Biases of the accelerometers by so many of the stated sd: one that shows widens the others.
+
+    Of 60 drives as many have their tilt within 95 % as 99 % of sixties of such a chance do.
+    """
+    inside = 0
+    for seed in range(SIXTY):
+        imu, truth, sensors = unit(DRIVE, 50.0, seed, "icm-20602")
+        more = np.random.default_rng(seed).normal(size=3) * np.sqrt(times**2 - 1.0)
+        beyond = imu.copy()
+        beyond.attrs = dict(imu.attrs)
+        beyond[ACCEL] = imu[ACCEL].to_numpy() + more * sensors.accel.axis("bias")
+        found = NO_SLIP.align(beyond, SITE, sensors, fixes(seed, noise=0.1, rate=1.0))
+        error = phi(found, truth[-1])[:2]
+        square = error @ np.linalg.solve(found.covariance[:2, :2], error)
+        inside += square < chi2.isf(0.05, 2)
+    low, high = binom.ppf([0.005, 0.995], SIXTY, 0.95)
+    assert low <= inside <= high
+
+
+@pytest.mark.slow
+def test_attitudes_of_units_that_warm_up_are_as_stated():
+    """Gyros drift by 0.1 deg/s until they are warm: at both ends of 60 drives, as above."""
+    warming = Warming(np.radians(0.1), 0.02, 60.0)
+    way = replace(NO_SLIP, backtrack=True)
+    inside = np.zeros(2, dtype=int)
+    for seed in range(SIXTY):
+        imu, truth, sensors = unit(DRIVE, 50.0, seed, "icm-20602")
+        warm = 1.0 - np.exp(-imu.index.to_numpy() / 60.0)
+        change = np.random.default_rng(seed).normal(size=(2, 3))
+        warmed = imu.copy()
+        warmed.attrs = dict(imu.attrs)
+        for names, of, size in ((GYRO, 0, warming.gyro), (ACCEL, 1, warming.accel)):
+            warmed[names] = imu[names].to_numpy() + size * warm[:, None] * change[of]
+        known = warming.within(sensors, 0.0, float(imu.index[-1]))
+        found = way.align(warmed, SITE, known, fixes(seed, noise=0.1, rate=1.0))
+        for k, (one, at) in enumerate(((found, -1), (found.earlier, 0))):
+            inside[k] += chi_square(one, truth[at]) < chi2.isf(0.05, 3)
+    low, high = binom.ppf([0.005, 0.995], SIXTY, 0.95)
+    assert (inside >= low).all()
+    # At the first sample a tenth of the weight of the fixes leaves wider bounds.
+    assert inside[0] <= high
 
 
 @pytest.mark.parametrize("current", [(0.0, 0.0), (1.5, -1.0)])
