@@ -112,6 +112,8 @@ export interface Fault {
 
 export interface Checked {
   toml: string; values: Record<string, unknown>; errors: Fault[];
+  /** What is wrong with the name of the result. */
+  name?: Problem | null;
   /** What was found before a value was set by hand, by key path. */
   was?: Record<string, unknown>;
   questions?: Question[];

@@ -213,6 +213,17 @@ def test_a_fault_has_its_line_and_key(folder):
     assert found["values"] == {"log.path": "log.csv", "log.to_s": "late", "log.frmo_s": 1.0}
 
 
+@pytest.mark.parametrize("name", ["../x", "a/b", "..", "-x", "con"])
+def test_a_name_that_cannot_be_one_is_the_only_fault(folder, two_recorders, name):
+    """Paths of the configuration begin at the folder, whatever the result is named."""
+    text = propose(folder, "crash", two_recorders, {}, None, {})["toml"]
+    fair, bad = (check(folder, "crash", text, {}, name=one) for one in ("x", name))
+    assert fair["name"] is None
+    assert {e["code"] for e in fair["errors"]} == {"config.open-value"}
+    assert bad["errors"] == fair["errors"]
+    assert bad["name"]["code"] == "studio.name-not-plain" and name in bad["name"]["text"]
+
+
 def test_the_level_of_heights_is_asked_and_taken(folder):
     """A phone's fixes over the sea could be read by an option of the command line alone."""
     rows = "".join(
