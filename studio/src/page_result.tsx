@@ -205,7 +205,7 @@ function Motion({ run, track, cursor, onCursor }: { run: RunDetail; track: Track
     </div>
     <div class="motion">
       {hasPlace && <Plan track={track} onMap={Boolean(run.has.track)} {...(run.over_ground === false ? { up: "forward at the entry" } : {})} fixes={track.fixes} reference={track.reference} cursor={at} onCursor={onCursor} />}
-      {track.q && <Attitude q={q} turned={run.over_ground === false} at={`${track.by ? `By ${track.by}, ` : ""}${stamp(at, 10)} s:`} />}
+      {track.q && <Attitude q={q} north={run.over_ground === false ? "entry" : "true"} at={`${track.by ? `By ${track.by}, ` : ""}${stamp(at, 10)} s:`} />}
     </div>
     <Series run={run} whole={whole} cursor={cursor} onCursor={onCursor} />
   </Part>;
