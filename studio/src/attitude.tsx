@@ -51,7 +51,7 @@ export function inWords(q: Quaternion, north: North = "true", bounds: Bound[] = 
 const SIZE: Vector = [1.0, 0.5, 0.28];
 const HEIGHT = 260;
 
-export function Attitude({ q, at, north = "true", bounds = [] }: { q: Quaternion | null; at?: string; north?: North; bounds?: Bound[] }) {
+export function Attitude({ q, at, north = "true", bounds = [], given = "" }: { q: Quaternion | null; at?: string; north?: North; bounds?: Bound[]; /** What it rests on, before its words. */ given?: string }) {
   const [element, width] = useWidth<HTMLDivElement>();
   const canvas = useRef<HTMLCanvasElement>(null);
   const [turn, setTurn] = useState<[number, number]>([0.45, 0.45]);
@@ -133,7 +133,7 @@ export function Attitude({ q, at, north = "true", bounds = [] }: { q: Quaternion
     }
   }, [q, turn, width, dark]);
 
-  const words = q ? inWords(q, north, bounds) : "No attitude at this instant.";
+  const words = q ? given + inWords(q, north, bounds) : "No attitude at this instant.";
   const keys = (event: KeyboardEvent) => {
     const by: Record<string, [number, number]> = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] };
     const change = by[event.key];

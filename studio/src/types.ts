@@ -144,6 +144,8 @@ export interface RunDetail extends Run {
   numbers: KeyNumber[]; options: Option[]; inputs: Input[]; findings: Finding[];
   /** What the heading integrity says, where the heading was not trusted throughout. */
   heading?: string | null;
+  /** What an attitude begins with, and why the answer is what it is; how its beginning was found. */
+  premises?: string[]; begins?: string | null;
   /** Reasons against the result, those of its verdict. */
   against?: Finding[];
   from_s?: number; to_s?: number;
