@@ -140,8 +140,8 @@ def states_of(folder: Folder, jobs: Jobs, number: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``states``: evenly over the output, and each of the last ones; ``silent_s``: by session, seconds since
-        its last message, as the file of its journal says.
+        ``states``: evenly over the output, and each of the last ones; ``silent_s``: by session,
+        seconds since its last message, as the file of its journal says.
     """
     job = jobs.shown(number)
     output = jobs.output(number)
