@@ -79,6 +79,7 @@ export const api = {
     post<Checked>("api/check", body, signal),
   begin: (body: Record<string, unknown>) => post<Job>("api/jobs", body),
   job: (id: string) => get<Job>(`api/jobs/${part(id)}`),
+  states: (id: string) => get<{ states: Record<string, unknown>[]; silent_s: Record<string, number> }>(`api/jobs/${part(id)}/states`),
   cancel: (id: string) => send<Job>(`api/jobs/${part(id)}`, { method: "DELETE", headers: CHANGES }),
   /** The case of a simulated crash, as text. */
   caseOf: async (name: string): Promise<string> => {

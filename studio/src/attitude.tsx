@@ -30,13 +30,20 @@ export function fromEuler(roll: number, pitch: number, heading: number): Quatern
   return [cr * cp * ch + sr * sp * sh, sr * cp * ch - cr * sp * sh, cr * sp * ch + sr * cp * sh, cr * cp * sh - sr * sp * ch];
 }
 
-/** `turned`: headings are from that at the entry, and none is from north. */
-export function inWords(q: Quaternion, turned = false): string {
+/** What headings are from: north, north by a magnetometer, or the heading at the entry or the start. */
+export type North = "true" | "magnetic" | "entry" | "start";
+
+/** A bound as the server writes it, by the name of its quantity. */
+export interface Bound { name: string; bound: string }
+
+export function inWords(q: Quaternion, north: North = "true", bounds: Bound[] = []): string {
   const [roll, pitch, heading] = euler(q);
-  const side = Math.abs(roll) < 0.05 ? "level across" : `${Math.abs(roll).toFixed(1)}° down on the ${roll > 0 ? "right" : "left"}`;
-  const nose = Math.abs(pitch) < 0.05 ? "nose level" : `nose ${Math.abs(pitch).toFixed(1)}° ${pitch > 0 ? "up" : "down"}`;
+  const within = (name: string) => { const bound = bounds.find((one) => one.name === name)?.bound; return bound ? ` (${bound.replace(/\s*deg$/, "°")})` : ""; };
+  const side = (Math.abs(roll) < 0.05 ? "level across" : `${Math.abs(roll).toFixed(1)}° down on the ${roll > 0 ? "right" : "left"}`) + within("Roll");
+  const nose = (Math.abs(pitch) < 0.05 ? "nose level" : `nose ${Math.abs(pitch).toFixed(1)}° ${pitch > 0 ? "up" : "down"}`) + within("Pitch");
   const signed = heading > 180 ? heading - 360 : heading;
-  const facing = !turned ? `Heading ${heading.toFixed(1)}°` : Math.abs(signed) < 0.05 ? "Not turned since the entry" : `Turned ${Math.abs(signed).toFixed(1)}° to the ${signed > 0 ? "right" : "left"} since the entry`;
+  const facing = (north === "true" ? `Heading ${heading.toFixed(1)}°` : north === "magnetic" ? `Heading ${heading.toFixed(1)}° from magnetic north`
+    : Math.abs(signed) < 0.05 ? `Facing as at the ${north}` : `Facing ${Math.abs(signed).toFixed(1)}° to the ${signed > 0 ? "right" : "left"} of the direction at the ${north}`) + within("Heading");
   return `${facing}, ${nose}, ${side}.`;
 }
 
@@ -44,7 +51,7 @@ export function inWords(q: Quaternion, turned = false): string {
 const SIZE: Vector = [1.0, 0.5, 0.28];
 const HEIGHT = 260;
 
-export function Attitude({ q, at, turned = false }: { q: Quaternion | null; at?: string; turned?: boolean }) {
+export function Attitude({ q, at, north = "true", bounds = [], given = "" }: { q: Quaternion | null; at?: string; north?: North; bounds?: Bound[]; /** What it rests on, before its words. */ given?: string }) {
   const [element, width] = useWidth<HTMLDivElement>();
   const canvas = useRef<HTMLCanvasElement>(null);
   const [turn, setTurn] = useState<[number, number]>([0.45, 0.45]);
@@ -89,8 +96,9 @@ export function Attitude({ q, at, turned = false }: { q: Quaternion | null; at?:
       ctx.font = "13px system-ui, sans-serif";
       ctx.fillText(text, p[0] - 5, p[1] + 4);
     };
-    label([1.4, 0, 0.9], turned ? "forward at the entry" : "N", color("--soft"));
-    if (!turned) label([0, 1.4, 0.9], "E", color("--soft"));
+    const toNorth = north === "true" || north === "magnetic";
+    label([1.4, 0, 0.9], !toNorth ? `forward at the ${north}` : north === "magnetic" ? "magnetic N" : "N", color("--soft"));
+    if (toNorth) label([0, 1.4, 0.9], "E", color("--soft"));
     if (!q) return;
     const corner = (a: number, b: number, c: number) => rotate(q, [a * SIZE[0], b * SIZE[1], c * SIZE[2]]);
     const faces: { points: Vector[]; fill: string }[] = [];
@@ -125,7 +133,7 @@ export function Attitude({ q, at, turned = false }: { q: Quaternion | null; at?:
     }
   }, [q, turn, width, dark]);
 
-  const words = q ? inWords(q, turned) : "No attitude at this instant.";
+  const words = q ? given + inWords(q, north, bounds) : "No attitude at this instant.";
   const keys = (event: KeyboardEvent) => {
     const by: Record<string, [number, number]> = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] };
     const change = by[event.key];

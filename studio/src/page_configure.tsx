@@ -126,6 +126,7 @@ const NOTHING: Record<string, unknown> = {};
 function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
   const { work, state } = useShared();
   const [checked, setChecked] = useState<Checked | null>(null);
+  const named = useRef("");
   const [checking, setChecking] = useState(true);
   const [problem, setProblem] = useState<Problem | null>(null);
   // What the run button answers, beside it.
@@ -143,6 +144,7 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
       // An answer to what was written since replaced is old.
       if (own !== serial.current) return;
       setChecked(answer);
+      named.current = work.name;
       setProblem(null);
       if (set) setWork({ toml: answer.toml });
     } catch (error) {
@@ -151,15 +153,15 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
     if (own === serial.current) setChecking(false);
   };
   useEffect(() => {
-    if (checked?.toml === work.toml) return;
+    if (checked?.toml === work.toml && named.current === work.name) return;
     const timer = setTimeout(() => void check(work.toml), checked ? 350 : 0);
     return () => clearTimeout(timer);
-  }, [work.toml]);
+  }, [work.toml, work.name]);
   const set = (change: Record<string, unknown>) => void check(work.toml, change);
 
   const run = async () => {
     setRefused(null);
-    if (reason) return setRefused({ code: "studio.not-ready", text: `It cannot run yet: ${reason}`, remedy: first || taken ? null : "Write it above." });
+    if (reason) return setRefused({ code: "studio.not-ready", text: `It cannot run yet: ${reason}`, remedy: first || taken ? null : checked?.name?.remedy ?? "Write it above." });
     if (checking) return setRefused({ code: "studio.not-ready", text: "It cannot run yet: the configuration is being checked", remedy: "Press again in a moment." });
     setStarting(true);
     try {
@@ -180,7 +182,7 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
   const offers = (proposal?.offers ?? []).filter((q) => values[q.key!] === undefined || isOpen(values[q.key!]));
   const taken = state?.runs.some((one) => one.name === work.name) ?? false;
   const reason = errors.length ? `${plural(errors.length, "error")} to correct first` : questions.length ? `${plural(questions.length, "question")} to answer first`
-    : !work.name.trim() ? "the result needs a name" : taken && force !== work.name ? `there is a result named ${work.name}: tick to overwrite it, or write another name` : "";
+    : !work.name.trim() ? "the result needs a name" : checked?.name ? checked.name.text : taken && force !== work.name ? `there is a result named ${work.name}: tick to overwrite it, or write another name` : "";
   /** Where the first thing is that is to be done: its control, for the focus. */
   const first = errors.length ? ".toml .findings button, .toml textarea" : questions.length ? ".ask button, .ask input" : "";
   useEffect(() => setRefused(null), [work.toml, work.name, force, questions.length, errors.length]);
@@ -222,10 +224,10 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
         onChange={(e) => flag === SMOOTH ? set({ "smoother.kind": e.currentTarget.checked ? "rts" : "none" }) : setWork({ options: e.currentTarget.checked ? [...work.options, flag] : work.options.filter((o) => o !== flag) })} />{FLAGS[flag]}</label>)}
     </fieldset>}
     <div class="next startrun">
-      <label class="inline">Name of the result <input type="text" value={work.name} onInput={(e) => setWork({ name: e.currentTarget.value })} aria-describedby="taken" /></label>
+      <label class="inline">Name of the result <input type="text" value={work.name} onInput={(e) => setWork({ name: e.currentTarget.value })} aria-invalid={Boolean(checked?.name)} aria-describedby="taken reason" /></label>
       {taken && <label class="inline" id="taken"><input type="checkbox" checked={force === work.name} onChange={(e) => setForce(e.currentTarget.checked ? work.name : "")} /> Overwrite the result of this name</label>}
       <button type="button" class={reason ? "main notready" : "main"} disabled={starting} aria-describedby="reason" onClick={() => void run()}>Run it</button>
-      <span id="reason" class={taken && reason ? "fault" : "soft"}>{starting ? "Starting…" : reason && sentence(reason)}</span>
+      <span id="reason" class={(taken || checked?.name) && reason ? "fault" : "soft"}>{starting ? "Starting…" : reason && sentence(reason)}</span>
     </div>
     <Trouble problem={refused} take />
     {refused && first && <p class="row"><button type="button" onClick={() => { const to = document.querySelector<HTMLElement>(first); to?.scrollIntoView({ block: "center" }); to?.focus(); }}>Go to the first</button></p>}

@@ -1,13 +1,13 @@
 // Live: listen to a phone or a sensor, show its address as a code to scan, and draw attitude and
 // position as they come. Every byte is kept; the session becomes a log like any other.
 
-import { useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useState } from "preact/hooks";
 import { encode } from "uqr";
 import { api, problemOf } from "./api";
-import { Attitude, fromEuler, type Quaternion } from "./attitude";
-import { stamp } from "./format";
+import { Attitude, fromEuler, type North, type Quaternion } from "./attitude";
+import { duration, stamp } from "./format";
 import { Plan, type Line } from "./plan";
-import { newWork, putJob, useShared } from "./store";
+import { CAME, history, newWork, putJob, useShared } from "./store";
 import { Traces, type Panel } from "./traces";
 import type { Job, Problem, Series, Span } from "./types";
 import { Busy, Command, Control, Empty, More, Page, Part, sentence, Table, Trouble, useRequest } from "./ui";
@@ -104,6 +104,16 @@ function attitudeOf(line: Record<string, unknown>): Quaternion | null {
   return roll === null || pitch === null ? null : fromEuler(roll, pitch, heading ?? 0);
 }
 
+/** Silent after so many of the periods in which states come, and not before so many ms. */
+const PERIODS = 4, LEAST = 2000;
+
+/** The longest silence of the sender as it sent, ms: what comes together is of one message. */
+function periodOf(lines: Record<string, unknown>[]): number {
+  const came = lines.slice(-100).map((line) => num(line, CAME)!);
+  const pauses = came.map((at, i) => at - (came[i - 1] ?? at)).filter((ms) => ms > 50).sort((a, b) => a - b);
+  return pauses[pauses.length >> 1] ?? LEAST / PERIODS;
+}
+
 function Session({ job }: { job: Job }) {
   const { lines: all, state } = useShared();
   const [problem, setProblem] = useState<Problem | null>(null);
@@ -113,6 +123,17 @@ function Session({ job }: { job: Job }) {
   const shown = device ?? devices[0] ?? "";
   const lines = states.filter((line) => String(line["session"] ?? "") === shown);
   const going = job.state === "running" || job.state === "waiting";
+  const [now, setNow] = useState(Date.now());
+  useEffect(() => { history(job.id).catch((error: unknown) => setProblem(problemOf(error))); }, [job.id]);
+  useEffect(() => {
+    if (!going) return;
+    const timer = setInterval(() => setNow(Date.now()), 500);
+    return () => clearInterval(timer);
+  }, [going]);
+  const last = lines[lines.length - 1];
+  const age = last ? Math.max(0, Math.max(now, Date.now() - 500) - num(last, CAME)!) : 0;
+  const silent = going && last !== undefined && age > Math.max(LEAST, PERIODS * periodOf(lines));
+  const old = silent ? duration(Math.floor(age / 1000)) : "";
   const end = async () => {
     try {
       putJob(await api.cancel(job.id));
@@ -123,7 +144,7 @@ function Session({ job }: { job: Job }) {
   // Each session is a log of the folder like any other.
   const logs = going ? [] : (state?.files ?? []).filter((file) => file.name.startsWith(`${job.name}/`));
   const open = (name: string) => { newWork([name]); location.hash = "#/look"; };
-  return <Part title={job.name} aside={<span class="soft" role="status">{going ? job.live ? lines.length ? "Receiving" : "Waiting for the first sample" : "Starting" : STATES[job.state]}</span>}>
+  return <Part title={job.name} aside={<span class="soft" role="status">{going ? job.live ? silent ? `Silent for ${old}` : lines.length ? "Receiving" : "Waiting for the first sample" : "Starting" : STATES[job.state]}</span>}>
     <Trouble problem={problem} />
     {job.state === "failed" && <Trouble problem={job.error} />}
     {going && job.live && <div class="pairing">
@@ -136,7 +157,8 @@ function Session({ job }: { job: Job }) {
       </div>
     </div>}
     {devices.length > 1 && <label class="inline">Device <select value={shown} onChange={(e) => setDevice(e.currentTarget.value)}>{devices.map((one) => <option key={one} value={one}>{one}</option>)}</select></label>}
-    {lines.length > 0 && <LiveState lines={lines} session={shown} />}
+    {silent && <p class="notice warn">Nothing has come for {old}: what is shown is of {stamp(num(last, "time")!, 10)} s, the last that came.</p>}
+    {lines.length > 0 && <LiveState lines={lines} session={shown} old={old} />}
     <div class="next">
       {going && <button type="button" onClick={() => void end()}>Stop listening</button>}
       {!going && job.run && <a class="button main" href={`#/result/${encodeURIComponent(job.run)}`}>See the result</a>}
@@ -153,7 +175,10 @@ const LOCAL = /^(127\.|localhost|\[::1\])/;
 
 const CURVES: [string, string, string[]][] = [["Roll and pitch", "deg", ["roll", "pitch"]], ["Heading", "deg", ["heading"]], ["Velocity", "m/s", ["VN", "VE", "VD"]]];
 
-function LiveState({ lines, session }: { lines: Record<string, unknown>[]; session: string }) {
+/** What a heading is from, by the words of a state. */
+const NORTHS: Record<string, North> = { "magnetic north": "magnetic", "the start": "start" };
+
+function LiveState({ lines, session, old }: { lines: Record<string, unknown>[]; session: string; old: string }) {
   const last = lines[lines.length - 1]!, time = num(last, "time")!;
   const [cursor, setCursor] = useState<number | null>(null);
   const track = useMemo<Line | null>(() => {
@@ -175,7 +200,7 @@ function LiveState({ lines, session }: { lines: Record<string, unknown>[]; sessi
   const rows = (last["shown"] ?? []) as { name: string; value: string; bound: string }[];
   return <>
     <div class="motion">
-      <Attitude q={attitudeOf(last)} at={`${stamp(time, 10)} s:`} />
+      <Attitude q={attitudeOf(last)} north={NORTHS[String(last["heading_from"])] ?? "true"} bounds={rows} at={`${stamp(time, 10)} s${old && `, ${old} ago`}:`} />
       {track && <Plan track={track} fixes={null} cursor={cursor ?? time} onCursor={setCursor} />}
     </div>
     {panels.length > 0 && <Traces panels={panels} whole={whole} askKey={session} ask={ask} cursor={cursor} onCursor={setCursor} />}

@@ -142,7 +142,7 @@ function Found({ look, reading }: { look: Look; reading: Reading }) {
     </Part>
     {imu && <Signals look={look} streams={streams} imu={imu} reading={reading} />}
     {(faults.length > 0 || notes.length > 0) && <Part title="What was noticed">
-      <Findings findings={faults} none="Nothing is wrong with it." />
+      <Findings findings={faults} none={needed.length ? "No fault was found. What is asked above is open." : "No fault was found."} />
       {notes.length > 0 && <More title={plural(notes.length, "note")}>{notes.map((note, i) => <Findings key={i} findings={[note]} />)}</More>}
     </Part>}
     <Part title="How it was read">

@@ -30,6 +30,7 @@ function Result({ run }: { run: RunDetail }) {
   return <>
     {run.verdict && VERDICTS[run.verdict] && <p class={`verdict ${VERDICTS[run.verdict]!.look}`}>{VERDICTS[run.verdict]!.words}</p>}
     <Against reasons={run.against ?? []} heading={run.heading ?? null} />
+    {(run.premises?.length ?? 0) > 0 && <ul class="plain against" aria-label="What it rests on">{run.premises!.map((one) => <li key={one}>{sentence(one)}</li>)}</ul>}
     <Numbers numbers={run.numbers} />
     {(run.figures?.length ?? 0) > 0 && <div class="drawings">
       {run.figures!.map((one) => <figure key={one.address} class={one.width > 1.5 * one.height ? "broad" : ""}><a href={one.address} target="_blank" rel="noopener noreferrer" aria-label={`${one.title}, alone`}><img src={one.address} alt={one.alt} width={one.width} height={one.height} loading="lazy" /></a><figcaption>{one.title}</figcaption></figure>)}
@@ -103,6 +104,7 @@ const nameOf = ({ group, label }: KeyNumber) => group === "Severity" ? label.spl
 function Numbers({ numbers: all }: { numbers: KeyNumber[] }) {
   if (!all.length) return null;
   const main = MAIN.flatMap((pattern) => all.filter((one) => pattern.test(`${one.group}: ${one.label}`)).slice(0, 1)).slice(0, 6);
+  const of = (group: string) => all.filter((one) => one.group === group);
   const large = main.length ? main : all.filter((one) => one.value && one.bound).slice(0, 4);
   return <>
     {large.length > 0 && <dl class="keys">
@@ -114,8 +116,8 @@ function Numbers({ numbers: all }: { numbers: KeyNumber[] }) {
     </dl>}
     {large.some((one) => one.bound) && <p class="help">Bounds hold 95 % of the time.</p>}
     <More title={`All ${plural(all.length, "number")}`}>
-      <div class="pairs">{[...new Set(all.map((one) => one.group))].map((group) => <Table key={group} caption={group || "Result"} head={["Quantity", "Value with 95 % bound"]} numeric={[1]}
-        rows={all.filter((one) => one.group === group).map((one) => [one.note ? <>{one.label} <span class="soft said">{one.note}</span></> : one.label, said(one)])} />)}</div>
+      <div class="pairs">{[...new Set(all.map((one) => one.group))].map((group) => <Table key={group} caption={group || "Result"} head={["Quantity", of(group).some((one) => one.bound) ? "Value with 95 % bound" : "Value"]} numeric={[1]}
+        rows={of(group).map((one) => [one.note ? <>{one.label} <span class="soft said">{one.note}</span></> : one.label, said(one)])} />)}</div>
     </More>
   </>;
 }
@@ -205,7 +207,7 @@ function Motion({ run, track, cursor, onCursor }: { run: RunDetail; track: Track
     </div>
     <div class="motion">
       {hasPlace && <Plan track={track} onMap={Boolean(run.has.track)} {...(run.over_ground === false ? { up: "forward at the entry" } : {})} fixes={track.fixes} reference={track.reference} cursor={at} onCursor={onCursor} />}
-      {track.q && <Attitude q={q} turned={run.over_ground === false} at={`${track.by ? `By ${track.by}, ` : ""}${stamp(at, 10)} s:`} />}
+      {track.q && <Attitude q={q} north={run.over_ground === false ? "entry" : run.begins === "zero" || run.begins === "level" ? "start" : "true"} given={run.begins === "zero" ? "from a beginning that was taken as zero: " : ""} at={`${track.by ? `By ${track.by}, ` : ""}${stamp(at, 10)} s:`} />}
     </div>
     <Series run={run} whole={whole} cursor={cursor} onCursor={onCursor} />
   </Part>;

@@ -102,15 +102,40 @@ export function putJob(job: Job) {
   if (before?.state !== job.state && job.state !== "waiting" && job.state !== "running") void refresh();
 }
 
-const LINES_KEPT = 3000;
+const LINES_KEPT = 4000;
+/** When a state came, by the clock of this page, ms. */
+export const CAME = "came";
+
+const sessionOf = (line: Record<string, unknown>) => String(line["session"] ?? "");
+
+/** Fewer lines from the beginning on: of the older half of each session every other one. */
+function thinned(lines: Record<string, unknown>[]) {
+  if (lines.length <= LINES_KEPT) return lines;
+  const seen: Record<string, number> = {};
+  return lines.filter((line, i) => i > lines.length / 2 || (seen[sessionOf(line)] = (seen[sessionOf(line)] ?? 0) + 1) % 2);
+}
+
+/** States from the beginning of a live run, which came before this page listened. */
+export async function history(id: string) {
+  const { states, silent_s } = await api.states(id);
+  const newest: Record<string, number> = {};
+  for (const line of states) {
+    newest[sessionOf(line)] = Number(line["time"]);
+    line[CAME] = Date.now() - 1000 * (silent_s[sessionOf(line)] ?? 0);
+  }
+  const later = (shared.lines[id] ?? []).filter((line) => !(Number(line["time"]) <= newest[sessionOf(line)]!));
+  change({ lines: { ...shared.lines, [id]: thinned([...states, ...later]) } });
+}
+
 let pendingLines: { id: string; data: Record<string, unknown> }[] = [];
 
 function drawLines() {
   // All lines that came since the last frame are drawn together.
   const lines = { ...shared.lines };
   for (const { id, data } of pendingLines) {
-    lines[id] = [...(lines[id] ?? []).slice(-LINES_KEPT), data];
+    lines[id] = [...(lines[id] ?? []), data];
   }
+  for (const id of new Set(pendingLines.map((one) => one.id))) lines[id] = thinned(lines[id]!);
   pendingLines = [];
   change({ lines });
 }
@@ -123,6 +148,7 @@ function take(text: string) {
   if (event.job) putJob(event.job);
   if (event.files) void refresh();
   if (event.line) {
+    event.line.data[CAME] = Date.now();
     pendingLines.push(event.line);
     if (pendingLines.length === 1) setTimeout(drawLines, 100);
   }

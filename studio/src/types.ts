@@ -112,6 +112,8 @@ export interface Fault {
 
 export interface Checked {
   toml: string; values: Record<string, unknown>; errors: Fault[];
+  /** What is wrong with the name of the result. */
+  name?: Problem | null;
   /** What was found before a value was set by hand, by key path. */
   was?: Record<string, unknown>;
   questions?: Question[];
@@ -142,6 +144,8 @@ export interface RunDetail extends Run {
   numbers: KeyNumber[]; options: Option[]; inputs: Input[]; findings: Finding[];
   /** What the heading integrity says, where the heading was not trusted throughout. */
   heading?: string | null;
+  /** What an attitude begins with, and why the answer is what it is; how its beginning was found. */
+  premises?: string[]; begins?: string | null;
   /** Reasons against the result, those of its verdict. */
   against?: Finding[];
   from_s?: number; to_s?: number;

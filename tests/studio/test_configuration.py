@@ -213,6 +213,17 @@ def test_a_fault_has_its_line_and_key(folder):
     assert found["values"] == {"log.path": "log.csv", "log.to_s": "late", "log.frmo_s": 1.0}
 
 
+@pytest.mark.parametrize("name", ["../x", "a/b", "..", "-x", "con"])
+def test_a_name_that_cannot_be_one_is_the_only_fault(folder, two_recorders, name):
+    """Paths of the configuration begin at the folder, whatever the result is named."""
+    text = propose(folder, "crash", two_recorders, {}, None, {})["toml"]
+    fair, bad = (check(folder, "crash", text, {}, name=one) for one in ("x", name))
+    assert fair["name"] is None
+    assert {e["code"] for e in fair["errors"]} == {"config.open-value"}
+    assert bad["errors"] == fair["errors"]
+    assert bad["name"]["code"] == "studio.name-not-plain" and name in bad["name"]["text"]
+
+
 def test_the_level_of_heights_is_asked_and_taken(folder):
     """A phone's fixes over the sea could be read by an option of the command line alone."""
     rows = "".join(
@@ -662,6 +673,38 @@ def test_what_look_finds_names_no_option_of_the_command_line(folder):
     said = json.dumps(found)
     assert "io.sampling-taken-as-instantaneous" in said
     assert not re.search(r"(?<![\w-])--[a-z]", said)
+
+
+def test_what_nobody_stated_is_not_said_to_be_stated(folder):
+    """The reason of a unit or a column that was inferred to go on, and of one that was stated."""
+    head, *lines = (folder / "log.csv").read_text(encoding="utf-8").splitlines()
+    rows = np.array([[float(x) for x in line.split(",")] for line in lines])
+    # Turns by 30 units of it a second about x, while gravity does not: no rad/s.
+    rows[:, 1:4] *= 57.3
+    rows[:, 1] = 30.0 * np.sin(3.0 * rows[:, 0]) * (rows[:, 0] > 20.0)
+    head = head.replace("_rad_s", "")
+    np.savetxt(folder / "open.csv", rows, "%.9g", ",", header=head, comments="")
+
+    def reasons(log):
+        found = look(folder, ["open.csv"], log)
+        asked = [q["key"] for q in found["questions"] if not q.get("optional")]
+        return asked, {r["quantity"]: r["why"] for r in found["logs"][0]["read_as"]}
+
+    asked, inferred = reasons({})
+    assert asked == ["gyro_unit"]
+    assert "unit inferred, not yet confirmed" in inferred["gyro_x"]
+    assert "stated by" not in inferred["gyro_x"] + inferred["accel_x"]
+    asked, stated = reasons({"gyro_unit": "rad/s"})
+    assert asked == [] and "unit stated by the user" in stated["gyro_x"]
+    columns = {"gyro_x": "gyro_x", "gyro_y": "gyro_y", "gyro_z": "gyro_z"}
+    # Without a likely one, too, the unit is asked by clicks.
+    few = rows * np.r_[1.0, 0.0, 1.0 / 57.3, 1.0 / 57.3, 1.0, 1.0, 1.0]
+    np.savetxt(folder / "few.csv", few, "%.9g", ",", header=head, comments="")
+    (ask,) = [q for q in look(folder, ["few.csv"], {})["questions"] if not q.get("optional")]
+    assert (ask["key"], ask["code"]) == ("gyro_unit", "io.unit-undecided")
+    assert {one["set"]["gyro_unit"] for one in ask["choices"]} >= {"rad/s", "deg/s"}
+    _, named = reasons({"gyro_unit": "rad/s", "columns": columns})
+    assert named["gyro_x"].startswith("stated by the user")
 
 
 def test_a_folder_of_two_recorders_is_its_files(folder):

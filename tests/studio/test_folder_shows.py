@@ -8,13 +8,18 @@ import os
 import re
 import subprocess
 import sys
+import time
 
+import numpy as np
 import pytest
 from tests.map_files import mbtiles, pmtiles, png
 
 from strapdown.errors import ConfigError
 from strapdown.studio import app as studio_app
 from strapdown.studio import server
+from strapdown.studio.events import states_of
+from strapdown.studio.folder import Folder
+from strapdown.studio.jobs import Jobs
 from strapdown.studio.live_jobs import (
     PORT,
     PROTOCOLS,
@@ -243,3 +248,45 @@ def test_numbers_of_a_live_state_are_those_of_the_reports():
         "Velocity north": (f"\N{MINUS SIGN}3.220{gap}m/s", ""),
         "steps taken": ("12.00", ""),
     }
+
+
+def live_output(folder, lines):
+    """Jobs of a folder with a live run that ended with such an output."""
+    state = Folder.open(folder).state / "jobs"
+    job = {"id": "a" * 16, "kind": "live", "name": "walk", "words": ["live"], "made": 1.0}
+    job |= {"state": "done", "begun": 1.0, "ended": 2.0}
+    (state / f"{job['id']}.json").write_text(json.dumps(job), encoding="utf-8")
+    (state / f"{job['id']}.log").write_text("".join(lines), encoding="utf-8")
+    return Jobs(Folder.open(folder)), job["id"]
+
+
+def test_states_of_a_live_run_are_given_from_its_beginning(tmp_path):
+    """As after a reload: evenly, the last ones whole, each once and in order, of all devices."""
+    lines = ["listening at 127.0.0.1:1\n"]
+    for k in range(40_000):
+        state = {"session": f"phone-{k % 2}", "time": k / 10, "roll": k % 7, "roll_sd": 1.0}
+        lines.append(json.dumps(state) + "\n")
+    jobs, number = live_output(tmp_path, [*lines, '{"session": "phone-0", "ti'])
+    for name, ago in (("phone-0", 0.0), ("phone-1", 90.0)):
+        (tmp_path / "walk" / name).mkdir(parents=True)
+        (tmp_path / "walk" / name / "journal").write_bytes(b"x")
+        at = time.time() - ago
+        os.utime(tmp_path / "walk" / name / "journal", (at, at))
+    told = states_of(Folder.open(tmp_path), jobs, number)
+    stamps = [state["time"] for state in told["states"]]
+    assert stamps == sorted(set(stamps)) and stamps[0] == 0.0 and stamps[-1] == 3999.9
+    assert len(stamps) < 8000 and max(np.diff(stamps)) < 3 * 4000.0 / 2000
+    assert {state["session"] for state in told["states"]} == {"phone-0", "phone-1"}
+    assert [state["session"] for state in told["states"] if "shown" in state] == [
+        "phone-0",
+        "phone-1",
+    ]
+    assert told["silent_s"]["phone-0"] < 60.0 < told["silent_s"]["phone-1"] < 150.0
+
+
+def test_states_of_a_short_live_run_are_all_of_them(tmp_path):
+    lines = ['{"session": "..", "time": NaN}\n', '{"session": "a", "time": 2.5}\n']
+    jobs, number = live_output(tmp_path, lines)
+    told = states_of(Folder.open(tmp_path), jobs, number)
+    assert [state["time"] for state in told["states"]] == [None, 2.5]
+    assert told["silent_s"] == {}

@@ -124,6 +124,22 @@ def test_the_reference_of_an_attitude_is_drawn_beside_its_algorithms(fresh):
     )
 
 
+def test_a_result_of_an_attitude_says_what_it_rests_on(fresh):
+    """As the terminal does: a beginning of zero because none was given, and what is judged."""
+    turning_log(fresh.folder / "log.csv")
+    for name, more in (("zero", " --from 7"), ("level", ""), ("given", " --initial 1,2,3")):
+        line = f"strapdown attitude log.csv --algorithms quaternion --no-report --out {name}{more}"
+        by_command_line(fresh.folder, line)
+        told = fresh.ask("GET", f"api/runs/{name}").json
+        assert told["begins"] == name
+        start, bias, *why = told["premises"]
+        assert start.startswith("Initial attitude: roll ") and bias.startswith("Gyro bias: ")
+        assert "zero, because none was given" in start or name != "zero"
+        assert "roll 1.000°, pitch 2.000°, heading 3.000°" in start or name != "given"
+        answer = json.loads((fresh.folder / name / "attitude.json").read_text(encoding="utf-8"))
+        assert why == answer["answer"]["why"] and "and not the sensor" in why[-1]
+
+
 def test_a_session_of_a_live_run_is_a_log(fresh):
     session = fresh.folder / "walk" / "phone-1"
     session.mkdir(parents=True)

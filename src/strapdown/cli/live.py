@@ -234,7 +234,7 @@ def _print_sessions(hub: Hub, command: str) -> None:
             print_table(
                 [
                     "session",
-                    "samples",
+                    "readings, all sensors",
                     "median, ms",
                     "99 %",
                     "largest",

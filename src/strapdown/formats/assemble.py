@@ -623,7 +623,7 @@ def stamps_of_log(
     if dated:
         unit, why = "ns", "dates or times of day"
     elif options.time_unit:
-        unit, why = parse_unit(options.time_unit, "time"), "stated by --time-unit"
+        unit, why = parse_unit(options.time_unit, "time"), options.why("time_unit")
     elif column.basis == "file":
         why = column.why
     elif unit is None and "time_unit" in said and said["time_unit"].settled:

@@ -15,7 +15,7 @@ from strapdown.formats.arrays import is_stamp, numbers, ticks_of
 from strapdown.formats.clocks import clock_of_name
 from strapdown.formats.columns import INDEXED, ColumnName, clocks_with_unit, read_name
 from strapdown.formats.nameless import rates_and_force
-from strapdown.formats.recording import Questions, RawLog, ReadOptions
+from strapdown.formats.recording import INFERRED, STATED, Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import (
     BODY_RATES,
     FIXES,
@@ -31,11 +31,12 @@ AXES = "xyz"
 
 
 #: What assigns a column to its quantity.
-Basis = Literal["name", "file", "option", "numbers"]
+Basis = Literal["name", "file", "option", "numbers", "open"]
 _WHY: dict[Basis, str] = {
     "name": "by its name",
     "file": "stated by the file",
-    "option": "stated by --columns",
+    "option": STATED,
+    "open": INFERRED,
     "numbers": "inferred",
 }
 
@@ -48,7 +49,7 @@ class Column:
     ----------
     source : str
     unit : str or None
-    basis : {'name', 'file', 'option', 'numbers'}
+    basis : {'name', 'file', 'option', 'numbers', 'open'}
         What assigns it to the quantity.
     """
 
@@ -75,6 +76,7 @@ def find_columns(
     """
     asked_here = questions or Questions(raw.name)
     wanted: dict[str, str] = {}
+    inferred: set[str] = set()
     for quantity, source in options.columns.items():
         if quantity not in QUANTITIES and quantity not in TRIADS:
             raise ConfigError(
@@ -93,6 +95,7 @@ def find_columns(
                     name=name,
                 )
             wanted[q] = name
+            inferred |= {q} if quantity in options.inferred else set()
     # Triads that are not asked for are those of the unit of which one is.
     of_units = (unit for unit in raw.other_units if not set(wanted.values()).isdisjoint(unit))
     stated_columns = next(of_units, raw.stated)
@@ -110,7 +113,8 @@ def find_columns(
             found |= {q: Column(names[int(k) - 1], None, "numbers") for q, k in likely.items()}
     for q, name in wanted.items():
         stated = found[q].unit if q in found and found[q].source == name else None
-        found[q] = Column(name, _unit_of(raw, name) or stated, "option")
+        basis: Basis = "open" if q in inferred else "option"
+        found[q] = Column(name, _unit_of(raw, name) or stated, basis)
     if questions is None:
         asked_here.refuse()
     return found

@@ -117,6 +117,8 @@ class ReadOptions:
         A key of `formats.READERS`; detected from the file if not given.
     calibration : str, optional
         File of `strapdown calibrate`: known errors of the sensor, which are taken off.
+    inferred : frozenset of str
+        Units and quantities of `columns` that nobody stated: they were inferred, to go on.
     """
 
     columns: dict[str, str] = field(default_factory=dict)
@@ -129,6 +131,15 @@ class ReadOptions:
     repair: bool = False
     format: str | None = None
     calibration: str | None = None
+    inferred: frozenset[str] = frozenset()
+
+    def why(self, key: str) -> str:
+        """Say whose statement a unit or a column is."""
+        return INFERRED if key in self.inferred else STATED
+
+
+#: Whose statement an option is, as a `Reading` shows it.
+STATED, INFERRED = "stated by the user", "inferred, not yet confirmed"
 
 
 @dataclass(frozen=True)

@@ -229,7 +229,7 @@ def _stated_unit(
     # A magnetometer has no such option.
     asked = getattr(options, f"{triad}_unit", None)
     if asked:
-        return parse_unit(asked, triad), f"stated by --{triad}-unit"
+        return parse_unit(asked, triad), options.why(f"{triad}_unit")
     columns = [found[f"{triad}_{a}"] for a in AXES]
     units = {c.unit for c in columns}
     known = set(UNITS[triad])

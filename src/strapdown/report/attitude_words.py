@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -160,19 +160,7 @@ def reference_lines(bench: AttitudeComparison) -> list[str]:
 
 def facts(bench: AttitudeComparison) -> list[tuple[str, str]]:
     """Inputs and assumptions of the run."""
-    i, removed = bench.initial, str(bench.gyro_bias["from"])
-    if (bias := bench.gyro_bias["rad_per_s"]) is not None:
-        values = ", ".join(f"{math.degrees(v):.4f}" for v in bias)
-        removed = f"({values}) deg/s about forward, right, down removed: {removed}"
-    found = [
-        ("Log", bench.description),
-        (
-            "Initial attitude",
-            f"roll {i['roll_deg']:.3f}°, pitch {i['pitch_deg']:.3f}°, heading "
-            f"{i['heading_deg']:.3f}° at {seconds(i['time_s'])}: {i['from']}",
-        ),
-        ("Gyro bias", removed),
-    ]
+    found = [("Log", bench.description), *premises(bench.initial, bench.gyro_bias)]
     if bench.truth is not None:
         found.append(("Truth", _truth_words(bench)))
     if bench.second is not None:
@@ -202,6 +190,19 @@ def facts(bench: AttitudeComparison) -> list[tuple[str, str]]:
     elif not bench.scores:
         found.append(("At rest", "no stationary stretch of a second or more was found"))
     return found
+
+
+def premises(initial: Mapping[str, Any], gyro_bias: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What the attitude of a run begins with, by the tables of these names in its JSON."""
+    i, removed = initial, str(gyro_bias["from"])
+    if (bias := gyro_bias["rad_per_s"]) is not None:
+        values = ", ".join(f"{math.degrees(v):.4f}" for v in bias)
+        removed = f"({values}) deg/s about forward, right, down removed: {removed}"
+    begins = (
+        f"roll {i['roll_deg']:.3f}°, pitch {i['pitch_deg']:.3f}°, heading "
+        f"{i['heading_deg']:.3f}° at {seconds(i['time_s'])}: {i['from']}"
+    )
+    return [("Initial attitude", begins), ("Gyro bias", removed)]
 
 
 def _truth_words(bench: AttitudeComparison) -> str:

@@ -172,8 +172,13 @@ def _navigate(part: RunPart) -> Iterator[Value]:
         yield from _row(f"integrity.{name}.trusted", "Integrity", label, share, "%", kind="share")
     judged = shares_words({key: share for key, share in shares.items() if share is not None})
     note = f"{judged} of the time; final status: {at_end}" if judged and at_end else ""
+    arm = any(
+        _word(one, "code") == "navigation.lever-arm-zero" for one in _tables(data, "findings")
+    )
+    of_arm = "without the lever arm, taken as zero" if arm else ""
+    notes = {"end.heading_deg": note, "end.horizontal_m": of_arm}
     for number in _state(_table(data, "end")):
-        yield replace(number, note=note) if number.key == "end.heading_deg" else number
+        yield replace(number, note=notes.get(number.key, ""))
     largest = _number(integrity, "position", "largest_bound_95_m")
     label = "largest 95 % bound, horizontal"
     yield from _row("bounds.largest_horizontal_m", "Bounds", label, largest, "m")

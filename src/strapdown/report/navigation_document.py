@@ -55,7 +55,7 @@ from strapdown.report.values import (
     share_words,
 )
 from strapdown.report.values import stamp as instant
-from strapdown.report.verdict import integrity_sections, status_words
+from strapdown.report.verdict import integrity_sections, status_words, without_arm
 from strapdown.rotation import within_half_turn
 from strapdown.systems.navigation_run import NavigationRun, withheld_aid
 from strapdown.tables import EULER, NED, VELOCITY
@@ -69,11 +69,12 @@ _NO_HEADING = 180.0
 
 def headline(evaluation: NavigationEvaluation) -> str:
     """Return the end position, the distance traveled, and the bounds."""
-    record = evaluation.record
+    record, arm = evaluation.record, without_arm(evaluation.run)
     return (
         f"Ended at {position_words(evaluation)} after {duration_words(_duration(evaluation))} and "
         f"{length_words(distance_over_ground(record.trajectory))}; 95 % bounds: position "
-        f"{length_words(float(evaluation.bounds[-1]))}, heading {_heading(evaluation)}."
+        f"{length_words(float(evaluation.bounds[-1]))}{f' ({arm})' if arm else ''}, "
+        f"heading {_heading(evaluation)}."
     )
 
 
@@ -91,7 +92,7 @@ def key_figures(evaluation: NavigationEvaluation) -> tuple[KeyFigure, ...]:
     record = evaluation.record
     sd = record.sd.iloc[-1]
     last = record.trajectory.iloc[-1]
-    plane = float(evaluation.bounds[-1])
+    plane, arm = float(evaluation.bounds[-1]), without_arm(evaluation.run)
     heading = half(sd["heading"])
     out = [
         KeyFigure(
@@ -104,7 +105,8 @@ def key_figures(evaluation: NavigationEvaluation) -> tuple[KeyFigure, ...]:
         KeyFigure(
             "Final position",
             f"±{GAP}{length_words(plane)}",
-            f"horizontal, 95{GAP}%; height {_stated(float(last['alt']), sd['down'], 'm')}",
+            f"horizontal, 95{GAP}%{arm and f', {arm}'}; "
+            f"height {_stated(float(last['alt']), sd['down'], 'm')}",
             position_words(evaluation),
         ),
         KeyFigure(

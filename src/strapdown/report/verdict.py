@@ -78,6 +78,12 @@ def answer(evaluation: NavigationEvaluation) -> str:
     return f"{bound_words(evaluation)} {heading_words(evaluation.run.trust)}"
 
 
+def without_arm(result: NavigationRun) -> str:
+    """Say what no bound of position has: a lever arm that nobody measured; empty without one."""
+    arms = [one.data["name"] for one in result.findings if one.code == "navigation.lever-arm-zero"]
+    return f"without the lever arm of {' and '.join(arms)}, taken as zero" if arms else ""
+
+
 def bound_words(evaluation: NavigationEvaluation) -> str:
     """Return the 95 % bound of the position, at the end and at its worst."""
     result, bounds = evaluation.run, evaluation.bounds
@@ -88,6 +94,7 @@ def bound_words(evaluation: NavigationEvaluation) -> str:
     sized = f"{length_words(end)} at the end" + (
         "" if same else f", {length_words(most)} at most (at {instant(at)})"
     )
+    sized += f", {arm}" if (arm := without_arm(result)) else ""
     first = result.trust.against_bounds
     if not result.trust.consistency:
         return (

@@ -28,7 +28,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from strapdown import __version__
 from strapdown.bundle.atomic_folder import replace_file
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
-from strapdown.studio.events import Events
+from strapdown.studio.events import Events, states_of
 from strapdown.studio.folder import Folder, plain_name
 from strapdown.studio.guard import SANDBOX
 from strapdown.studio.jobs import Jobs
@@ -352,6 +352,12 @@ async def job(studio: Studio, request: Request) -> Response:
     return JSONResponse(studio.jobs.shown(request.path_params["id"]))
 
 
+async def states(studio: Studio, request: Request) -> Response:
+    """States of a live run from its beginning."""
+    number = request.path_params["id"]
+    return JSONResponse(await run_in_threadpool(states_of, studio.folder, studio.jobs, number))
+
+
 async def cancel(studio: Studio, request: Request) -> Response:
     """End a job."""
     shown = await run_in_threadpool(studio.jobs.cancel, request.path_params["id"])
@@ -618,6 +624,7 @@ def make_app(studio: Studio) -> Starlette:
         ("POST", "/api/check", check),
         ("POST", "/api/jobs", submit),
         ("GET", "/api/jobs/{id}", job),
+        ("GET", "/api/jobs/{id}/states", states),
         ("DELETE", "/api/jobs/{id}", cancel),
         ("GET", "/api/runs/{name}", run),
         ("GET", "/api/runs/{name}/series", run_series),

@@ -29,7 +29,7 @@ from strapdown.config.toml_file import (
 )
 from strapdown.config.toml_text import Asked
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
-from strapdown.studio.folder import Folder
+from strapdown.studio.folder import Folder, plain_name
 from strapdown.studio.kinds import KINDS, Kind
 from strapdown.studio.questions import offered_question, open_question
 from strapdown.studio.reading_process import told
@@ -135,22 +135,26 @@ def check(
     -------
     dict
         ``toml``; ``values`` by key path, as they are written; ``was``: those that were found before
-        they were set by hand; ``errors``: line, key, path, text and remedy.
+        they were set by hand; ``errors``: line, key, path, text and remedy; ``name``: what is wrong
+        with the name of the run, or None.
     """
     one = _kind(kind)
+    refused = refused_name(name)
+    named = None if refused is None else told(refused)
     text = edited(toml, changes)
     errors: list[dict[str, Any]] = []
     try:
         table = parse_toml(_path(folder, name), text).table
     except ConfigError as error:
         faults = list(_faults(error.finding, {}))
-        return {"toml": text, "values": {}, "was": {}, "errors": faults}
+        return {"toml": text, "values": {}, "was": {}, "errors": faults, "name": named}
     try:
         checked(folder, one, text, name)
     except ConfigError as error:
         errors = list(_faults(error.finding, key_lines(text)))
     values = {dotted(path): value for path, value in _flat(table, ())}
-    return {"toml": text, "values": values, "was": _found_before(text), "errors": errors}
+    was = _found_before(text)
+    return {"toml": text, "values": values, "was": was, "errors": errors, "name": named}
 
 
 def dotted(path: KeyPath) -> str:
@@ -404,8 +408,20 @@ def _kind(kind: str) -> Kind:
 
 
 def _path(folder: Path, name: str) -> Path:
-    """Path of a file that is not written: its name is that of the run, its folder the studio's."""
-    return folder / f"{name or 'configuration'}.toml"
+    """Path of a file that is not written: its name is that of the run, its folder the studio's.
+
+    A name that cannot be one is not used: paths of the configuration begin at the studio's folder.
+    """
+    return folder / f"{name if name and refused_name(name) is None else 'configuration'}.toml"
+
+
+def refused_name(name: str) -> Finding | None:
+    """Return what is wrong with the name of a run; None: nothing, or it is not yet written."""
+    try:
+        plain_name(name or "run")
+    except ConfigError as error:
+        return error.finding
+    return None
 
 
 def _short(text: str) -> str:

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import asyncio
 import json
+import time
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, BinaryIO
 
 from starlette.concurrency import run_in_threadpool
 from starlette.websockets import WebSocket
 
-from strapdown.studio.folder import Folder
+from strapdown.errors import ConfigError
+from strapdown.formats.live_journal import JOURNAL
+from strapdown.studio.folder import Folder, plain_name
 from strapdown.studio.jobs import ENDED, Jobs
 from strapdown.studio.live_jobs import shown_state
 
-__all__ = ["Events"]
+__all__ = ["Events", "states_of"]
 
 #: Seconds between two looks at the jobs, and looks at jobs between two at the folder.
 EVERY, OF_FOLDER = 0.1, 10
@@ -23,6 +27,8 @@ EVERY, OF_FOLDER = 0.1, 10
 WAITING = 500
 #: Longest line of a live run that is passed on, bytes; bytes of lines at once.
 LINE, PART = 8192, 256 << 10
+#: Places of a run at which a page is given a state, and all of the last `PART` of its output.
+KEPT = 2000
 
 
 @dataclass(eq=False)
@@ -124,17 +130,68 @@ class Events:
             data = stream.read(size - at)
         whole = data.rfind(b"\n") + 1
         self._read[number] = at + whole
-        found = []
-        for line in data[:whole].splitlines():
-            if len(line) <= LINE and line[:1] == b"{":
-                with suppress(ValueError):
-                    found.append({"line": {"id": number, "data": json.loads(line)}})
-        found = found[-WAITING // 4 :]
-        # The page writes the numbers of the last state of each session.
-        last = {str(one["line"]["data"].get("session")): one["line"]["data"] for one in found}
-        for state in last.values():
-            state["shown"] = shown_state(state)
-        return found
+        states = with_numbers(_states(data[:whole].splitlines())[-WAITING // 4 :])
+        return [{"line": {"id": number, "data": state}} for state in states]
+
+
+def states_of(folder: Folder, jobs: Jobs, number: str) -> dict[str, Any]:
+    """Return states of a live run from its beginning, and how long its sessions are silent.
+
+    Returns
+    -------
+    dict
+        ``states``: evenly over the output, and each of the last ones; ``silent_s``: by session,
+        seconds since its last message, as the file of its journal says.
+    """
+    job = jobs.shown(number)
+    output = jobs.output(number)
+    lines: list[bytes] = []
+    for path in (output.with_name(output.name + ".before"), output):
+        with suppress(OSError), path.open("rb") as stream:
+            lines += _lines_over(stream, path.stat().st_size, KEPT)
+    states = with_numbers(_states(lines))
+    silent = {}
+    for name in {str(state.get("session", "")) for state in states}:
+        with suppress(ConfigError, OSError):
+            journal = folder.within(f"{job['name']}/{plain_name(name)}") / JOURNAL
+            silent[name] = max(0.0, time.time() - journal.stat().st_mtime)
+    return {"states": states, "silent_s": silent}
+
+
+def _lines_over(stream: BinaryIO, size: int, most: int) -> list[bytes]:
+    """Return whole lines evenly over a file, and all of its last `PART`; the latter if shorter."""
+    found: dict[int, bytes] = {}
+    for k in range(most if size > PART else 0):
+        stream.seek(size * k // most)
+        if k:
+            stream.readline()
+        at = stream.tell()
+        while (line := stream.readline(LINE)) and line[:1] != b"{":
+            at = stream.tell()
+        found[at] = line
+    stream.seek(max(0, size - PART))
+    if size > PART:
+        stream.readline()
+    while stream.tell() < size:
+        found[stream.tell()] = stream.readline(LINE)
+    return [found[at] for at in sorted(found)]
+
+
+def _states(lines: Iterable[bytes]) -> list[dict[str, Any]]:
+    """Return the lines that are states."""
+    found = []
+    for line in lines:
+        if len(line) <= LINE and line[:1] == b"{":
+            with suppress(ValueError):
+                found.append(json.loads(line, parse_constant=lambda _: None))
+    return found
+
+
+def with_numbers(states: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Give the last state of each session its numbers as the page writes them."""
+    for state in {str(one.get("session")): one for one in states}.values():
+        state["shown"] = shown_state(state)
+    return states
 
 
 async def _until_closed(socket: WebSocket) -> None:

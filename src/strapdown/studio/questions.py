@@ -85,9 +85,10 @@ def question_of(
     """
     triad = (finding.quantity or "").partition("_")[0]
     named = {q: a for q, a in answers.items() if q not in PLAIN and not q.endswith("_unit")}
-    if f"{triad}_unit" in answers and finding.code not in COLUMNS_OPEN:
-        key = f"{triad}_unit"
-        choices = list(_units(key, answers[key], finding))
+    key = f"{triad}_unit"
+    undecided = finding.code == "io.unit-undecided" and key in OFFERED
+    if undecided or (key in answers and finding.code not in COLUMNS_OPEN):
+        choices = list(_units(key, answers.get(key), finding))
         return _question(finding, file, key, choices, "text")
     if "repair" in answers and not (triad in named or finding.quantity in named):
         choices = [_choice("Leave out what cannot be used, and report it", {"repair": True})]
@@ -210,10 +211,10 @@ def _blank(code: str, text: str, key: str) -> dict[str, Any]:
     return {"code": code, "text": text, "key": key, "choices": [], "free": None, "unit": None}
 
 
-def _units(key: str, inferred: str, finding: Finding) -> Iterator[dict[str, Any]]:
+def _units(key: str, inferred: str | None, finding: Finding) -> Iterator[dict[str, Any]]:
     shares: Any = finding.data.get("choices", ())
     said = [str(f.data["value"]) for f in shares if isinstance(f, Finding) and "value" in f.data]
-    likely = [] if inferred in PLACEHOLDERS else [inferred]
+    likely = [] if inferred is None or inferred in PLACEHOLDERS else [inferred]
     usual = OFFERED.get(key, [])
     for unit in dict.fromkeys(likely + said + usual):
         if unit != "None":

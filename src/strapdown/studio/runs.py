@@ -170,6 +170,8 @@ def run(folder: Path, name: str) -> dict[str, Any]:
         "over_ground": manifest["command"] != "crash" or is_over_ground(answer),
         # Why the verdict is not the best one; a reason is noticed, too, and once.
         "against": against,
+        "premises": _premises(answer) if manifest["command"] == "attitude" else [],
+        "begins": _word(answer.get("initial"), "method"),
         "findings": [one for one in against if (one["code"], one["text"]) not in said] + noticed,
         "versions": manifest["versions"],
         "verifying": shlex.join(("strapdown", "verify", name)),
@@ -258,6 +260,18 @@ def _numbers(sealed: SealedRun) -> list[dict[str, Any]]:
                 }
             )
     return found[:MOST]
+
+
+def _premises(answer: Mapping[str, Any]) -> list[str]:
+    """Return what an attitude begins with, and why the answer is what it is."""
+    from strapdown.report.attitude_words import premises
+
+    found = [one for one in _list(answer.get("answer"), "why") if isinstance(one, str)]
+    # What another program wrote may have another form: it is then not told.
+    with suppress(KeyError, TypeError, ValueError):
+        said = premises(answer["initial"], answer["gyro_bias"])
+        found = [*(f"{name}: {text}" for name, text in said), *found]
+    return [one[:500] for one in found[:20]]
 
 
 def _heading(sealed: SealedRun) -> str | None:

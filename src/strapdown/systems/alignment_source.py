@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -93,9 +93,11 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
 
 
 def body_record(
-    log: LogTable, axes: AxesTable
+    log: LogTable, axes: AxesTable, inferred: Iterable[str] = ()
 ) -> tuple[Recording, pd.DataFrame, tuple[Finding, ...]]:
     """Read a log, rotate it into body axes, and cut it to the used span.
+
+    `inferred`: as in `ReadOptions`.
 
     Returns
     -------
@@ -107,7 +109,8 @@ def body_record(
     """
     gyro, accel = axes_matrices(axes)
     letters, turn = axes_letters(gyro) if gyro is not None else (axes.axes, None)
-    recording = read_log(log.path, read_options(log, letters))
+    options = replace(read_options(log, letters), inferred=frozenset(inferred))
+    recording = read_log(log.path, options)
     findings = list(recording.findings)
     imu = recording.imu
     if gyro is not None and accel is not None and turn is not None:

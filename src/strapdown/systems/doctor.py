@@ -402,7 +402,7 @@ def _inertial(log: LogTable, axes: str | None) -> _Inertial:
     refused = None
     for _ in range(ROUNDS):
         try:
-            recording, imu, findings = body_record(log, AxesTable(axes=axes))
+            recording, imu, findings = body_record(log, AxesTable(axes=axes), answers)
             return _Inertial(log, recording, imu, findings, tuple(questions), answers, None)
         except DataError as error:
             refused = error.finding

@@ -37,6 +37,8 @@ VERTICAL = 570.0
 LONG = 1800.0
 #: Tolerance of the first fix from a stated position: standard deviations, m, and m/s since.
 FAR_SD, FAR, FAST = 10.0, 1000.0, 340.0
+#: Lever arm that vehicles have, and the standard deviation of one by a tape measure, m.
+ARM, ARM_SD = 2.0, 0.02
 #: Measurements that bound the height error.
 HOLDS_HEIGHT = ("gnss", "barometer", "no_slip", "body_velocity")
 
@@ -65,9 +67,31 @@ def look_through(
             part = WHOLE if spec.log is None else spec.log.part_s(index_of(imu)[0])
             found += gnss_readiness(table, imu, aid, part)
             _refuse_far(spec, table, imu, aid)
+            found += () if spec.log is None else _lever_arm(table, aid)
         elif isinstance(aid, TabulatedMeasurement):
             _refuse_apart(table, imu)
     return (*found, *_height(spec, imu))
+
+
+def finer_than_arm(table: pd.DataFrame) -> float | None:
+    """Standard deviation of the fixes, horizontal, m; None if the usual arm is no more than it."""
+    sd = values_of(table, POSITION_SD)[:, :2]
+    sd = sd[np.isfinite(sd)]
+    middle = float(np.median(sd)) if sd.size else math.inf
+    return middle if middle < ARM else None
+
+
+def _lever_arm(table: pd.DataFrame, aid: Gnss) -> tuple[Finding, ...]:
+    """Warn of a lever arm of zero, which no antenna has, beside fixes that are finer than one.
+
+    One whose standard deviation is beyond that of a tape measure is estimated, and in the bounds.
+    """
+    sd = finer_than_arm(table)
+    stated = np.any(np.asarray(aid.lever_arm)) or np.any(np.asarray(aid.lever_arm_sd) > ARM_SD)
+    if sd is None or stated or not aid.use_position:
+        return ()
+    what = Finding("navigation.lever-arm-zero", severity="warning", name=aid.name, sd_m=sd)
+    return (what,)
 
 
 def _refuse_apart(table: pd.DataFrame, imu: pd.DataFrame) -> None:

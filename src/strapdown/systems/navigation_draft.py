@@ -35,6 +35,7 @@ from strapdown.systems.alignment_draft import (
     stage,
     toml_value,
 )
+from strapdown.systems.navigation_checks import finer_than_arm
 from strapdown.systems.navigation_proposal import LOUD, NOISE_KEYS, TAKEN, Proposal, propose
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables.checks import index_of, source_of, values_of
@@ -42,8 +43,6 @@ from strapdown.tables.checks import index_of, source_of, values_of
 __all__ = ["STANCE", "STANDING", "draft_navigation", "first_stand", "on_foot", "second_order"]
 
 
-#: Lever arm that vehicles have, m.
-ARM = 2.0
 #: Finding of a kind of sampling that is not stated; turns are means over so many seconds.
 UNSTATED, STEADY = "io.sampling-taken-as-instantaneous", 0.5
 #: Errors of other sensors in the recording, as comments of their tables.
@@ -495,8 +494,8 @@ def _commented(page: Page, table: str, values: Mapping[str, Any]) -> None:
 
 def _arm(gnss: pd.DataFrame | None) -> str:
     """Consequence of a lever arm of zero; empty where fixes are coarse against a usual one."""
-    sd = math.inf if gnss is None else float(np.nanmedian(values_of(gnss, POSITION_SD)[:, :2]))
-    if not sd < ARM:
+    sd = None if gnss is None else finer_than_arm(gnss)
+    if sd is None:
         return ""
     return (
         "zero, as of an antenna on the sensors: measure it, forward, right, down; an arm of 1 m is "

@@ -54,6 +54,7 @@ from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
 from strapdown.sensors.rest import LEAST_LENGTH, find_rests_of_every_grade
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty, stated_imu
 from strapdown.systems.alignment_source import body_record
+from strapdown.systems.navigation_checks import ARM_SD
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
@@ -153,9 +154,9 @@ SHOWN, UNDERSTATED, MISSTATED = 0.15, 1.5, 10.0
 SHARE_SD, SCATTER = 3.0, 2.31
 #: Jerk of a vehicle, m/s³, that is not to be taken for scatter.
 JERK = 3.0
-#: Fixes better than this, m, show that a lever arm is measured by a tape to so much, m. Velocities
-#: do where the body turns: its rate without vibration, by means over so many seconds.
-SHOWS_ARM, ARM_SD, TURNING = 0.1, 0.02, 0.2
+#: Fixes better than this, m, show that a lever arm is measured by a tape. Velocities do where the
+#: body turns: its rate without vibration, by means over so many seconds.
+SHOWS_ARM, TURNING = 0.1, 0.2
 #: Attributes of fixes with assumed standard deviations, and the keys of these.
 TAKEN = {"position_sd_taken": "position_sd_m", "velocity_sd_taken": "velocity_sd_m_per_s"}
 
