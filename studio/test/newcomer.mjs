@@ -61,6 +61,9 @@ await run(async () => {
   await look("newcomer-2-two-recorders");
   await ask(names[0]).getByRole("button", { name: "x forward, y left, z up" }).click();
   await ask(names[0]).waitFor({ state: "detached" });
+  await page.getByRole("button", { name: `Take back: ${names[0]} axes: forward-left-up` }).click();
+  await ask(names[0]).getByRole("button", { name: "x forward, y left, z up" }).click();
+  await ask(names[0]).waitFor({ state: "detached" });
   await ask(names[1]).getByRole("button", { name: /^x right, y forward, z up/ }).click();
   await ask(names[1]).waitFor({ state: "detached" });
   await page.getByRole("link", { name: "Choose what to find out" }).click();

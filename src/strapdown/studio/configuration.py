@@ -38,6 +38,8 @@ __all__ = ["check", "checked", "command", "edited", "propose"]
 
 #: Configurations of the folder that are offered at most.
 MOST_READY = 5
+#: Code of a value that is still a question mark.
+OPEN = "config.open-value"
 #: Longest text of a configuration, characters; keys that are changed at once.
 LONGEST, MOST = 1 << 20, 200
 
@@ -87,6 +89,7 @@ def propose(
         "toml": text,
         "questions": [q for q in _questions(text, first.asked) if q["key"] not in answers],
         "to_check": _questions(text, first.to_check),
+        "assumed": _questions(text, _assumed(text, first.to_check)),
         "findings": [told(finding) for finding in first.findings],
         "found": list(first.found),
         "choose": list(first.choose),
@@ -149,6 +152,9 @@ def check(
         checked(folder, one, text, name)
     except ConfigError as error:
         errors = list(_faults(error.finding, key_lines(text)))
+        if any(one["code"] == OPEN for one in errors):
+            for fault in one.form.faults_of_stated(parse_toml(_path(folder, name), text)):
+                errors += _faults(fault, key_lines(text))
     values = {dotted(path): value for path, value in _flat(table, ())}
     return {"toml": text, "values": values, "was": _found_before(text), "errors": errors}
 
@@ -443,20 +449,60 @@ def _faults(finding: Finding, lines: Mapping[KeyPath, Sequence[int]]) -> Iterato
         }
 
 
+#: An example in the remark on a value: a text, a list, or numbers and what they are of.
+EXAMPLE = re.compile(r"\be\.g\. (\"[^\"]*\"|\[[^\]]*\]|-?\d[^;:]*)")
+
+
 def _questions(text: str, asked: Sequence[Asked]) -> list[dict[str, Any]]:
     """Return open values of a text as questions, each with its key path."""
-    by_line: dict[int, list[KeyPath]] = {}
-    for path, numbers in key_lines(text).items():
-        for number in numbers:
-            by_line.setdefault(number, []).append(path)
     written = text.split("\n")
     found = []
+    by_line = _paths_by_line(text)
     for one in asked:
         paths = [p for p in by_line.get(one.line, []) if p and p[-1] == one.key]
         key = dotted(paths[0]) if paths else one.key
         line = written[one.line - 1] if one.line <= len(written) else ""
         count = line.partition("#")[0].count("?") or 1
-        found.append(open_question(one, key, unit_of_key(one.key), count))
+        example = EXAMPLE.search(_remark(written, one.line))
+        said = "" if example is None or "e.g." in one.what else example[1].strip('"')
+        value = _literal(line.partition("=")[2].partition("  # ")[0].strip())
+        question = open_question(one, key, unit_of_key(one.key), count, said)
+        found.append({**question, "open": None if value is None else value.unwrap()})
+    return found
+
+
+def _paths_by_line(text: str) -> dict[int, list[KeyPath]]:
+    found: dict[int, list[KeyPath]] = {}
+    for path, numbers in key_lines(text).items():
+        for number in numbers:
+            found.setdefault(number, []).append(path)
+    return found
+
+
+def _remark(written: Sequence[str], line: int) -> str:
+    """Return the remark beside the value of a line, or without one the comment right above it."""
+    beside = written[line - 1].rpartition("  # ")[2] if "  # " in written[line - 1] else ""
+    above: list[str] = []
+    for one in reversed(written[: line - 1]):
+        # What a value is known by begins a remark; without that a remark is of the line alone.
+        if beside or not one.startswith("# ") or (above and REMARK.match(above[0])):
+            break
+        above.insert(0, one)
+    return beside or " ".join(one.removeprefix("# ") for one in above)
+
+
+#: How a remark begins that is more than words.
+REMARK = re.compile(rf"# *(?:found|assumed|yours|{OWN})")
+
+
+def _assumed(text: str, confirmed: Sequence[Asked]) -> list[Asked]:
+    """Return what a proposal assumes and does not ask to confirm."""
+    written, known = text.split("\n"), {one.line for one in confirmed}
+    found = []
+    for line, paths in _paths_by_line(text).items():
+        said = re.match(r"assumed\b[:,]? ?(.*)", _remark(written, line))
+        if said and paths[0] and line not in known and " = " in written[line - 1]:
+            found.append(Asked(line, str(paths[0][-1]), said[1]))
     return found
 
 
