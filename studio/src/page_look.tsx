@@ -131,12 +131,17 @@ const WORDS: Record<string, string> = {
 
 const wordsOf = (s: Stream) => WORDS[s.name] ?? (ofCrash(s) ? s.name.replace(/^crash-/, "channels of a crash, ") : s.name);
 
+const UNUSED = /^io\.attitude-(not-used|of-other-phone)$/;
+
 function Found({ look, reading }: { look: Look; reading: Reading }) {
   const { work } = useShared();
   const records = recordsOf(look);
   // That a record is no log of inertial samples is no fault of it; what is wrong with a channel is.
   const faults = [...look.logs.flatMap((log) => log.faults.filter((f) => !records.includes(log) || f.severity !== "error").map((f) => ({ ...f, file: f.file ?? log.name }))), ...look.between.filter((f) => f.severity !== "note")];
-  const notes = [...look.between.filter((f) => f.severity === "note"), ...look.logs.flatMap((log) => log.notes.map((f) => ({ ...f, file: f.file ?? log.name })))];
+  const told = [...look.between.filter((f) => f.severity === "note"), ...look.logs.flatMap((log) => log.notes.map((f) => ({ ...f, file: f.file ?? log.name })))];
+  // That an attitude of the file is left unused is nothing to find in a closed list.
+  const notes = told.filter((f) => !UNUSED.test(f.code));
+  faults.push(...told.filter((f) => UNUSED.test(f.code)));
   const streams = look.streams.filter((s) => s.rows > 1 && s.columns.length > 0);
   const imu = streams.find((s) => s.name === "imu") ?? streams[0];
   const several = look.logs.length > 1;

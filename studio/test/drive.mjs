@@ -71,6 +71,7 @@ export async function open(address, shots) {
 /** An answer to a question by what it asks for, or the example that it gives. */
 function answer(text, example) {
   if (/unit of/i.test(text)) return /gyr|omega|rate/i.test(text) ? "rad/s" : "m/s2";
+  if (/^samples a second/i.test(text)) return "500";
   if (/\bsits\b|position/i.test(text)) return "-1.0, 0.4, 0.2";
   if (/\bspeed\b|how fast/i.test(text)) return "50";
   if (/^heading/i.test(text)) return "0";

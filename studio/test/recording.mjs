@@ -12,6 +12,8 @@ const [address, shots, part, ...sets] = process.argv.slice(2);
 const { page, look, click, see, done, expect, run } = await open(address, shots);
 const KINDS = ["Navigation", "Attitude", "Crash"];
 const POSSIBLE = /This log has it|Possible, with limits/;
+// What the preview of a crash cannot compute of such answers it says.
+page.on("response", (one) => { if (/crash\/quick/.test(one.url()) && !one.ok()) expect(); });
 const alert = page.getByRole("alert").first();
 const still = () => page.waitForFunction(() => !document.querySelector("main .busy"), null, { timeout: 400_000 });
 

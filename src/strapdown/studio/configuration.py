@@ -17,7 +17,7 @@ from typing import Any
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
-from strapdown.bundle import named_paths
+from strapdown.bundle import named_paths, names_file
 from strapdown.config.reading import FileSpec
 from strapdown.config.toml_file import (
     DEEPEST,
@@ -105,13 +105,18 @@ def propose(
 
 def _ready(place: Folder, kind: Kind, names: Sequence[str]) -> Iterator[dict[str, Any]]:
     """Yield the configurations of the folder for such a run over these files."""
-    written = [path for one in place.entries() if (path := Path(one.path)).suffix == ".toml"]
+    root = [Path(one.path) for one in place.entries()]
+    folders = {path if path.is_dir() else path.parent for path in map(place.file, names)}
+    beside = [path for one in folders - {place.path} for path in one.glob("*.toml")]
+    written = [path for path in (*root, *beside) if path.suffix == ".toml"]
     count = 0
     for path in sorted(written, key=lambda one: one.stat().st_mtime, reverse=True)[:MOST]:
         with suppress(ConfigError, DataError, OSError, UnicodeDecodeError):
             if path.stat().st_size > LONGEST:
                 continue
             text = path.read_text(encoding="utf-8")
+            if path.parent != place.path:
+                text = _from_root(place, path, text)
             table = parse_toml(path, text).table
             read = [Path(name) for name in named_paths(table)]
             if not any(one.is_relative_to(name) for one in read for name in names):
@@ -119,7 +124,7 @@ def _ready(place: Folder, kind: Kind, names: Sequence[str]) -> Iterator[dict[str
             spec = checked(place.path, kind, text, path.stem)
             said = {key: str(getattr(spec, key, "") or "") for key in ("title", "description")}
             yield {
-                "name": path.name,
+                "name": place.name_of(path),
                 "title": said["title"],
                 "what": said["description"],
                 "toml": text,
@@ -127,6 +132,16 @@ def _ready(place: Folder, kind: Kind, names: Sequence[str]) -> Iterator[dict[str
             count += 1
         if count == MOST_READY:
             return
+
+
+def _from_root(place: Folder, path: Path, text: str) -> str:
+    """Return a configuration in a folder with its files named from that of the studio."""
+    table, inside = parse_toml(path, text).table, place.name_of(path.parent)
+    document = tomlkit.parse(text)
+    for keys, value in _flat(table, ()):
+        if names_file(str(keys[-1]), value):
+            _change(document, dotted(keys), f"{inside}/{value}", tomlkit.table)
+    return tomlkit.dumps(document)
 
 
 def check(

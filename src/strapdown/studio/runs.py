@@ -154,6 +154,10 @@ def run(folder: Path, name: str) -> dict[str, Any]:
     has = {str(one["name"]) for one in manifest["outputs"]}
     against = [_finding(one) for one in _list(answer.get("trust"), "against")[:MOST]]
     noticed = [_finding(one) for one in _list(answer, "findings")[:MOST]]
+    if manifest["command"] == "attitude":
+        # Each is of one of several algorithms, as in the report.
+        for one in noticed:
+            one["text"] = ": ".join(filter(None, (one["quantity"], one["text"])))
     said = {(one["code"], one["text"]) for one in noticed}
     return {
         **summary(folder, name),
