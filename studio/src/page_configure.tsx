@@ -193,7 +193,8 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
   /** What is assumed, to correct: a value, or those of a table in the form alone. */
   const confirm = (q: Question) => {
     const field = fieldOf(schema, q.key!), inside = Object.keys(values).filter((key) => key.startsWith(`${q.key}.`));
-    const label = [ownerOf(q.key!, values), field?.label ?? words(q.key!.replace(/^.*\./, ""))].filter(Boolean).join(": ");
+    const own = field?.label ?? words(q.key!.replace(/^.*\./, "")), owner = ownerOf(q.key!, values);
+    const label = !owner || owner.startsWith(own) ? own : `${owner}: ${own}`;
     if (inside.length) return <div class="field" key={q.key}><b>{label}</b><p class="help">{sentence(q.text)} {inside.map((key) => `${words(key.slice(q.key!.length + 1))}: ${shown(values[key])}`).join("; ")}. Change it in the form.</p></div>;
     return <Control key={q.key} field={{ ...field, key: q.key!, label, unit: field?.unit ?? q.unit, type: field?.type ?? (Array.isArray(values[q.key!]) ? "list" : q.free ?? "text"), help: q.text }}
       value={values[q.key!]} fault={faultOf(errors, q.key!)} onChange={(value) => set({ [q.key!]: value })} />;
@@ -286,10 +287,10 @@ function Questions({ questions, values, onAnswer }: { questions: Question[]; val
   </Part>;
 }
 
-/** The recorder that a key is of, by its name, and which of its accelerometers. */
+/** What a key is of: a recorder by its name and which of its accelerometers, an aid, or a table. */
 function ownerOf(key: string, values: Record<string, unknown>): string {
   const [, unit, inner, number] = /^(units\.\d+)\.(?:(accelerometers|gyro)\.(?:(\d+)\.)?)?/.exec(key) ?? [];
-  if (!unit) return key.includes(".") ? words(key.slice(0, key.indexOf("."))) : "";
+  if (!unit) return words(/^aiding\.([^.]+)\./.exec(key)?.[1] ?? key.slice(0, Math.max(0, key.indexOf("."))));
   return [String(values[`${unit}.name`] ?? words(unit)), inner && `${inner === "gyro" ? inner : "accelerometers"}${number ? ` ${Number(number) + 1}` : ""}`].filter(Boolean).join(", ");
 }
 

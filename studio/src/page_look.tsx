@@ -172,7 +172,7 @@ function Found({ look, reading }: { look: Look; reading: Reading }) {
       {look.logs.filter((log) => log.read_as.length > 0).map((log, _, all) => all.length > 1 ? <More key={log.name} title={log.name}><ReadAs log={log} /></More> : <ReadAs key={log.name} log={log} />)}
       <ReadingForm files={look.logs.map((log) => log.name)} />
     </Part>
-    <Places look={look} reading={reading} streams={streams} />
+    {streams.length > 0 && <Places look={look} reading={reading} streams={streams} />}
     <div class="next"><a class="button main" href="#/choose">Choose what to find out</a></div>
   </>;
 }
@@ -191,12 +191,13 @@ function ReadAs({ log }: { log: LogFound }) {
 function Contents({ look }: { look: Look }) {
   const zero = zeroOf(look);
   return <>
-    <Table stack head={["Stream", "File", "Samples", "Rate", "From", "To", "Gaps"]} numeric={[2, 3, 4, 5, 6]}
+    {!look.streams.length && <Empty>{look.questions.some((q) => !q.optional) ? "Nothing can be shown before the question above is answered." : "No samples and no fixes were found."}</Empty>}
+    {look.streams.length > 0 && <Table stack head={["Stream", "File", "Samples", "Rate", "From", "To", "Gaps"]} numeric={[2, 3, 4, 5, 6]}
       rows={look.streams.map((s) => {
         const told = look.logs.find((log) => log.name === s.file)?.streams.find((one) => one.name === s.name);
         return [wordsOf(s), s.file ?? "", s.rows.toLocaleString("en"), rateOf(look, s) ? `${number(rateOf(look, s)!, 4)} Hz` : "–",
           `${stamp(s.from_s - zero, 1)} s`, `${stamp(s.to_s - zero, 1)} s`, told?.gaps ? `${told.gaps}, ${duration(told.lost_s)} lost` : "none"];
-      })} />
+      })} />}
     {saidOfZero(look, zero) && <p class="soft">{saidOfZero(look, zero)}</p>}
     <dl class="facts">
       {look.logs.map((log) => <Facts key={log.name} log={log} zero={zero} alone={look.logs.length === 1} />)}

@@ -77,7 +77,7 @@ async function made(kind, name) {
   await page.getByRole("textbox", { name: "Name of the result" }).fill(name);
   await look(`${name}-set-up`);
   await ask(page.getByRole("button", { name: "Run it" }), /api\/jobs$/);
-  const link = page.getByRole("link", { name: "See the result" }), failed = page.getByText("Failed");
+  const link = page.getByRole("link", { name: "See the result" }), failed = page.locator(".progress.failed, .progress.lost");
   await link.or(failed).first().waitFor({ timeout: 600_000 });
   const command = await page.locator(".command code").innerText();
   await look(`${name}-run`);
