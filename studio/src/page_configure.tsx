@@ -290,7 +290,7 @@ function Questions({ questions, values, onAnswer }: { questions: Question[]; val
 /** What a key is of: a recorder by its name and which of its accelerometers, an aid, or a table. */
 function ownerOf(key: string, values: Record<string, unknown>): string {
   const [, unit, inner, number] = /^(units\.\d+)\.(?:(accelerometers|gyro)\.(?:(\d+)\.)?)?/.exec(key) ?? [];
-  if (!unit) return words(/^aiding\.([^.]+)\./.exec(key)?.[1] ?? key.slice(0, Math.max(0, key.indexOf("."))));
+  if (!unit) return /^aiding\.([^.]+)\./.exec(key)?.[1] ?? words(key.slice(0, Math.max(0, key.indexOf("."))));
   return [String(values[`${unit}.name`] ?? words(unit)), inner && `${inner === "gyro" ? inner : "accelerometers"}${number ? ` ${Number(number) + 1}` : ""}`].filter(Boolean).join(", ");
 }
 

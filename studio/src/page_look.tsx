@@ -2,7 +2,7 @@
 
 import { useEffect, useId, useMemo, useState } from "preact/hooks";
 import { api, type Reading } from "./api";
-import { duration, number, plural, stamp } from "./format";
+import { capital, duration, number, plural, stamp } from "./format";
 import { Plan, type Line } from "./plan";
 import { setWork, useShared, type Point, type Work } from "./store";
 import { Traces, TrimBar, type Panel } from "./traces";
@@ -230,7 +230,7 @@ const QUANTITIES: [RegExp, string][] = [
 ];
 
 /** "speed_sd": "Speed, standard deviation". */
-const inWords = (name: string) => name.replace(/_sd$/, ", standard deviation").replaceAll("_", " ").replace(/^[a-z]/, (c) => c.toUpperCase());
+const inWords = (name: string) => capital(name.replace(/_sd$/, ", standard deviation").replaceAll("_", " "));
 
 /** Components of a north-east-down velocity. */
 const TOWARDS: Record<string, string> = { VN: "north", VE: "east", VD: "down" };

@@ -4,7 +4,7 @@
 import type { ComponentChildren, JSX } from "preact";
 import { useEffect, useId, useRef, useState } from "preact/hooks";
 import { problemOf } from "./api";
-import { number, shown } from "./format";
+import { capital, number, shown } from "./format";
 import type { Choice, Field, Finding, Option, Problem, Question } from "./types";
 
 /** The state of one request: begun again when `keys` change, an old answer never over a new one. */
@@ -105,8 +105,8 @@ function OneFinding({ finding: one }: { finding: Finding }) {
   </li>;
 }
 
-/** A text as a sentence; the name of a file or of a measurement at its beginning stays as it is. */
-export const sentence = (text: string) => (/^[\w-]+\.\w/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1)) + (/[.?!]$/.test(text) ? "" : ".");
+/** A text as a sentence. */
+export const sentence = (text: string) => capital(text) + (/[.?!]$/.test(text) ? "" : ".");
 
 /** Answers above this number are in a list that opens. */
 const MANY = 10;
