@@ -51,6 +51,15 @@ await run(async () => {
   assert.equal(await ticks.locator("> .item input:not(:checked)").count(), 0);
   assert.equal(await ticks.getByText(/\.toml/).count(), 0);
   done("all of the folder by the keyboard");
+  // A folder, and then a file of it: not both, but by a click.
+  await page.getByRole("button", { name: "Choose none" }).click();
+  const [folder, record] = ["sample-crash", "sample-crash/imu1_gyro.csv"].map((name) => ticks.locator(".item", { has: page.getByText(name, { exact: true }) }).getByRole("checkbox"));
+  await folder.check();
+  await ticks.locator("details:not([open]) > summary").click();
+  await record.check();
+  assert.equal(await folder.isChecked(), false, "what was chosen before is not");
+  await click("Choose this, too");
+  assert.ok(await folder.isChecked() && await record.isChecked());
   await page.locator("input[type=file]").setInputFiles(files);
   await page.locator(".sending").waitFor({ state: "detached" });
   await click(/^Look into 2/);
