@@ -155,9 +155,10 @@ def run(folder: Path, name: str) -> dict[str, Any]:
     against = [_finding(one) for one in _list(answer.get("trust"), "against")[:MOST]]
     noticed = [_finding(one) for one in _list(answer, "findings")[:MOST]]
     if manifest["command"] == "attitude":
-        # Each is of one of several algorithms, as in the report.
+        # What is of no file is of one of several algorithms, which the report names, too.
         for one in noticed:
-            one["text"] = ": ".join(filter(None, (one["quantity"], one["text"])))
+            if one["quantity"] and not one["file"]:
+                one["text"] = f"{one['quantity']}: {one['text']}"
     said = {(one["code"], one["text"]) for one in noticed}
     return {
         **summary(folder, name),
