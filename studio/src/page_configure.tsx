@@ -7,7 +7,7 @@ import { CrashPreview } from "./crash";
 import { number, plural, shown, stamp } from "./format";
 import { saidOf } from "./page_look";
 import { putJob, setWork, useShared, type Point, type Work } from "./store";
-import type { Checked, Fault, Field, Problem, Question, Section } from "./types";
+import type { Checked, Fault, Field, Finding, Problem, Question, Section } from "./types";
 import { Ask, Busy, Control, Copy, Empty, Findings, More, Page, Part, sentence, Trouble, useRequest, withUnit } from "./ui";
 import { Vehicle } from "./vehicle";
 
@@ -219,9 +219,10 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
       {assumed.length > 0 && <div class="fields wide">{assumed.map(confirm)}</div>}
       {others.length > 0 && <More open={!assumed.length} title={`${assumed.length ? "Further values" : plural(others.length, "value")} of which nothing was found`}><div class="fields wide">{others.map(confirm)}</div></More>}
     </Part>}
-    {proposal && (proposal.found?.length ?? 0) + proposal.findings.length > 0 && <More title="What was found while proposing it">
+    {proposal && <Findings findings={proposal.findings.filter(isOpenly)} />}
+    {proposal && (proposal.found?.length ?? 0) + proposal.findings.filter((one) => !isOpenly(one)).length > 0 && <More title="What was found while proposing it">
       <ul class="plain">{proposal.found?.map((text) => <li key={text}>{sentence(text)}</li>)}</ul>
-      <Findings findings={proposal.findings} />
+      <Findings findings={proposal.findings.filter((one) => !isOpenly(one))} />
     </More>}
     {proposal?.others?.map((other) => <div class="notice" key={other.name}><p>The record holds another vehicle: {other.name}.</p>
       <button type="button" onClick={() => setWork({ toml: other.toml, name: `${work.name}-${other.name}`.replace(/[^A-Za-z0-9_-]+/g, "_") })}>Use its case instead</button></div>)}
@@ -256,6 +257,9 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
 const isOpen = (value: unknown) => value === "?" || (Array.isArray(value) && value.includes("?"));
 
 const OPEN = "config.open-value";
+
+/** What a proposal says without a click: warnings, and that a reference of the files is left unused. */
+const isOpenly = (one: Finding) => one.severity !== "note" || one.code === "studio.reference-not-used";
 
 /** What still has a "?": asked in the words of the proposal, and what it is for in those of the check. */
 function openQuestions(checked: Checked | null, asked: Question[]): Question[] {
