@@ -83,7 +83,14 @@ const SEVERITY: Record<string, { word: string; look: string }> = {
 };
 
 /** Errors and warnings as a list; notes behind one line, where they are many. */
-export function Findings({ findings, none }: { findings: Finding[]; none?: string }) {
+export function Findings({ findings: all, none }: { findings: Finding[]; none?: string }) {
+  // One that several files have names them all.
+  const byText = new Map<string, Finding>();
+  for (const one of all) {
+    const key = `${one.severity} ${one.text ?? one.sentence ?? one.code} ${one.remedy}`, same = byText.get(key);
+    byText.set(key, same?.file && one.file && same.file !== one.file ? { ...same, file: `${same.file}, ${one.file}` } : same ?? one);
+  }
+  const findings = [...byText.values()];
   if (!findings.length) return none ? <Empty>{none}</Empty> : null;
   const of = (...severities: string[]) => findings.filter((one) => severities.includes(one.severity));
   const notes = findings.filter((one) => !["error", "warning"].includes(one.severity));
