@@ -57,3 +57,6 @@ export const seconds = (value: number | string | null): number | null => {
 };
 
 export const plural = (count: number, one: string, many = one + "s") => `${count.toLocaleString("en")} ${count === 1 ? one : many}`;
+
+/** A text with a capital first letter; the name of a file or of a measurement at its beginning stays as it is. */
+export const capital = (text: string) => /^[\w-]+\.\w/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1);

@@ -4,10 +4,11 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { aborted, api, problemOf } from "./api";
 import { CrashPreview } from "./crash";
-import { number, plural, stamp } from "./format";
+import { number, plural, shown, stamp } from "./format";
+import { saidOf } from "./page_look";
 import { putJob, setWork, useShared, type Point, type Work } from "./store";
-import type { Checked, Fault, Field, Problem, Question, Section } from "./types";
-import { Ask, Busy, Control, Copy, Empty, Findings, More, Page, Part, sentence, Trouble, useRequest } from "./ui";
+import type { Checked, Fault, Field, Finding, Problem, Question, Section } from "./types";
+import { Ask, Busy, Control, Copy, Empty, Findings, More, Page, Part, sentence, Trouble, useRequest, withUnit } from "./ui";
 import { Vehicle } from "./vehicle";
 
 /** What a proposal depends on: another one is offered when it changes. */
@@ -82,13 +83,11 @@ export function ConfigurePage() {
 
 /** What the configuration is made from: nothing that was chosen before is in it unseen. */
 function Basis({ work }: { work: Work }) {
-  const { files: own, ...common } = { ...work.log, ...(work.axes ? { axes: work.axes } : {}) } as Record<string, unknown>;
-  const of = (name: string, keys: Record<string, unknown>) => Object.entries(keys).map(([key, value]) => [`${name}${key.replaceAll("_", " ")}`, value] as const);
-  const read = [...of("", common), ...Object.entries((own ?? {}) as Record<string, Record<string, unknown>>).flatMap(([name, keys]) => of(`${name} `, keys))];
+  const read = saidOf(work);
   return <dl class="facts basis">
     <dt>Files</dt><dd>{work.files.join(", ")} <a href="#/files">Change</a></dd>
     {work.trim && <><dt>Part to use</dt><dd>{stamp(work.trim[0], work.trim[1] - work.trim[0])} to {stamp(work.trim[1], work.trim[1] - work.trim[0])} s <a href="#/look">Change</a></dd></>}
-    {read.length > 0 && <><dt>Read with</dt><dd>{read.map(([key, value]) => `${key}: ${typeof value === "object" ? JSON.stringify(value) : value === "" ? "none" : String(value)}`).join("; ")} <a href="#/look">Change</a></dd></>}
+    {read.length > 0 && <><dt>Read with</dt><dd>{read.map((one) => one.words).join("; ")} <a href="#/look">Change</a></dd></>}
     {work.places && <><dt>Places</dt><dd>of the sensor{work.places.antenna.some((v) => v !== 0) ? " and the antenna" : ""}, as drawn <a href="#/look">Change</a></dd></>}
   </dl>;
 }
@@ -158,6 +157,17 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
     return () => clearTimeout(timer);
   }, [work.toml, work.name]);
   const set = (change: Record<string, unknown>) => void check(work.toml, change);
+  /** Take an answer to a question; one that cannot be is not taken, and it is said why. */
+  const answer = async (change: Record<string, unknown>): Promise<string | void> => {
+    try {
+      const { errors } = await api.check({ kind, toml: work.toml, name: work.name, set: change });
+      const wrong = errors.find((e) => e.code !== OPEN && Object.keys(change).some((key) => isOf(e, key)));
+      if (wrong) return [wrong.text, wrong.remedy].filter(Boolean).map((text) => sentence(text!)).join(" ");
+    } catch {
+      // It is then said where the text is checked.
+    }
+    await check(work.toml, change);
+  };
 
   const run = async () => {
     setRefused(null);
@@ -178,8 +188,19 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
   // An open value is a question, not a mistake.
   const errors = checked?.errors.filter((e) => e.code !== OPEN) ?? [];
   const questions = openQuestions(checked, proposal?.questions ?? []);
-  const assumed = (proposal?.to_check ?? []).filter((q) => q.key && q.key in values);
+  const written = (q: Question) => Boolean(q.key) && Object.keys(values).some((key) => key === q.key || key.startsWith(`${q.key}.`));
+  const assumed = (proposal?.to_check ?? []).filter(written), others = (proposal?.assumed ?? []).filter(written);
+  const answered = (proposal?.questions ?? []).filter((q) => q.key && q.open !== undefined && q.open !== null && values[q.key] !== undefined && !isOpen(values[q.key]));
   const offers = (proposal?.offers ?? []).filter((q) => values[q.key!] === undefined || isOpen(values[q.key!]));
+  /** What is assumed, to correct: a value, or those of a table in the form alone. */
+  const confirm = (q: Question) => {
+    const field = fieldOf(schema, q.key!), inside = Object.keys(values).filter((key) => key.startsWith(`${q.key}.`));
+    const own = field?.label ?? words(q.key!.replace(/^.*\./, "")), owner = ownerOf(q.key!, values);
+    const label = !owner || owner.startsWith(own) ? own : `${owner}: ${own}`;
+    if (inside.length) return <div class="field" key={q.key}><b>{label}</b><p class="help">{sentence(q.text)} {inside.map((key) => `${words(key.slice(q.key!.length + 1))}: ${shown(values[key])}`).join("; ")}. Change it in the form.</p></div>;
+    return <Control key={q.key} field={{ ...field, key: q.key!, label, unit: field?.unit ?? q.unit, type: field?.type ?? (Array.isArray(values[q.key!]) ? "list" : q.free ?? "text"), help: q.text }}
+      value={values[q.key!]} fault={faultOf(errors, q.key!)} onChange={(value) => set({ [q.key!]: value })} />;
+  };
   const taken = state?.runs.some((one) => one.name === work.name) ?? false;
   const reason = errors.length ? `${plural(errors.length, "error")} to correct first` : questions.length ? `${plural(questions.length, "question")} to answer first`
     : !work.name.trim() ? "the result needs a name" : checked?.name ? checked.name.text : taken && force !== work.name ? `there is a result named ${work.name}: tick to overwrite it, or write another name` : "";
@@ -191,18 +212,19 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
       <p><b>{one.name}</b> in the folder is a configuration for these files{one.title ? <>: {sentence(one.title)}</> : "."} {one.what}</p>
       <p class="row"><button type="button" onClick={() => setWork({ toml: one.toml, proposal: { questions: [], findings: [], ready: proposal.ready!, from: one.name } })}>Use {one.name}</button> <span class="soft">Nothing is open in it. What is proposed here is replaced.</span></p>
     </div>)}
-    <Questions questions={questions} values={values} onAnswer={set} />
+    <Questions questions={questions} values={values} onAnswer={answer} />
+    {answered.length > 0 && <More title={`${plural(answered.length, "question")} answered`}><ul class="list">{answered.map((q) => <li class="item" key={q.key}>
+      <span class="name">{sentence(q.text)}</span><span>{withUnit(values[q.key!], q.unit ?? "")}</span><button type="button" aria-label={`Ask again: ${q.text}`} onClick={() => set({ [q.key!]: q.open })}>Ask again</button>
+    </li>)}</ul></More>}
     {offers.length > 0 && <Part title="Offered: add what is true">{offers.map((q) => <Ask key={q.key} question={q} onAnswer={set} />)}</Part>}
-    {assumed.length > 0 && <Part title="Assumed: correct it if it is wrong">
-      <div class="fields wide">{assumed.map((q) => {
-        const field = fieldOf(schema, q.key!);
-        return <Control key={q.key} field={{ ...field, key: q.key!, label: field?.label ?? q.key!, unit: field?.unit ?? q.unit, type: field?.type ?? (Array.isArray(values[q.key!]) ? "list" : q.free ?? "text"), help: q.text }}
-          value={values[q.key!]} fault={faultOf(errors, q.key!)} onChange={(value) => set({ [q.key!]: value })} />;
-      })}</div>
+    {assumed.length + others.length > 0 && <Part title="Assumed: correct it if it is wrong">
+      {assumed.length > 0 && <div class="fields wide">{assumed.map(confirm)}</div>}
+      {others.length > 0 && <More open={!assumed.length} title={`${assumed.length ? "Further values" : plural(others.length, "value")} of which nothing was found`}><div class="fields wide">{others.map(confirm)}</div></More>}
     </Part>}
-    {proposal && (proposal.found?.length ?? 0) + proposal.findings.length > 0 && <More title="What was found while proposing it">
+    {proposal && <Findings findings={proposal.findings.filter(isOpenly)} />}
+    {proposal && (proposal.found?.length ?? 0) + proposal.findings.filter((one) => !isOpenly(one)).length > 0 && <More title="What was found while proposing it">
       <ul class="plain">{proposal.found?.map((text) => <li key={text}>{sentence(text)}</li>)}</ul>
-      <Findings findings={proposal.findings} />
+      <Findings findings={proposal.findings.filter((one) => !isOpenly(one))} />
     </More>}
     {proposal?.others?.map((other) => <div class="notice" key={other.name}><p>The record holds another vehicle: {other.name}.</p>
       <button type="button" onClick={() => setWork({ toml: other.toml, name: `${work.name}-${other.name}`.replace(/[^A-Za-z0-9_-]+/g, "_") })}>Use its case instead</button></div>)}
@@ -238,6 +260,9 @@ const isOpen = (value: unknown) => value === "?" || (Array.isArray(value) && val
 
 const OPEN = "config.open-value";
 
+/** What a proposal says without a click: warnings, and that a reference of the files is left unused. */
+const isOpenly = (one: Finding) => one.severity !== "note" || one.code === "studio.reference-not-used";
+
 /** What still has a "?": asked in the words of the proposal, and what it is for in those of the check. */
 function openQuestions(checked: Checked | null, asked: Question[]): Question[] {
   if (!checked) return asked;
@@ -254,7 +279,7 @@ function openQuestions(checked: Checked | null, asked: Question[]): Question[] {
   });
 }
 
-function Questions({ questions, values, onAnswer }: { questions: Question[]; values: Record<string, unknown>; onAnswer: (set: Record<string, unknown>) => void }) {
+function Questions({ questions, values, onAnswer }: { questions: Question[]; values: Record<string, unknown>; onAnswer: (set: Record<string, unknown>) => Promise<string | void> }) {
   if (!questions.length) return null;
   return <Part title={`${plural(questions.length, "question")} only you can answer`}>
     {questions.map((q) => {
@@ -268,13 +293,23 @@ function Questions({ questions, values, onAnswer }: { questions: Question[]; val
   </Part>;
 }
 
+/** What a key is of: a recorder by its name and which of its accelerometers, an aid, or a table. */
+function ownerOf(key: string, values: Record<string, unknown>): string {
+  const [, unit, inner, number] = /^(units\.\d+)\.(?:(accelerometers|gyro)\.(?:(\d+)\.)?)?/.exec(key) ?? [];
+  if (!unit) return /^aiding\.([^.]+)\./.exec(key)?.[1] ?? words(key.slice(0, Math.max(0, key.indexOf("."))));
+  return [String(values[`${unit}.name`] ?? words(unit)), inner && `${inner === "gyro" ? inner : "accelerometers"}${number ? ` ${Number(number) + 1}` : ""}`].filter(Boolean).join(", ");
+}
+
 /** The field of the form that a full name belongs to. */
 const fieldOf = (schema: Section[], key: string) => schema.flatMap((s) => s.fields).find((f) => pattern(f.key).test(key));
 
-const faultOf = (errors: Fault[], key: string) => errors.find((e) => {
-  const at = e.path ?? e.key?.replaceAll(", ", ".") ?? "";
+/** Whether a fault is of a key, or of what is in it. */
+function isOf(fault: Fault, key: string): boolean {
+  const at = fault.path ?? fault.key?.replaceAll(", ", ".") ?? "";
   return at === key || at.startsWith(`${key}.`);
-})?.text;
+}
+
+const faultOf = (errors: Fault[], key: string) => errors.find((e) => isOf(e, key))?.text;
 
 const escape = (text: string) => text.replace(/[.+?^${}()|[\]\\]/g, "\\$&");
 const pattern = (key: string) => new RegExp(`^${escape(key).replaceAll("*", "([^.]+)")}$`);

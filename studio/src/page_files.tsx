@@ -11,9 +11,12 @@ import { Empty, More, Page, Part, Trouble } from "./ui";
 
 interface Sending { name: string; share: number; problem: Problem | null; taken: boolean; file: File }
 
+const placeOf = (name: string) => name.slice(0, name.lastIndexOf("/") + 1);
+
 export function FilesPage() {
   const { state, work } = useShared();
   const [chosen, setChosen] = useState<string[]>(work.files);
+  const [left, setLeft] = useState<string[]>([]);
   const [sending, setSending] = useState<Sending[]>([]);
   const [over, setOver] = useState(false);
   const [problem, setProblem] = useState<Problem | null>(null);
@@ -78,7 +81,14 @@ export function FilesPage() {
     }
   };
   const leave = (one: Sending) => setSending((all) => all.filter((s) => s.name !== one.name));
-  const toggle = (name: string) => setChosen(here.includes(name) ? here.filter((n) => n !== name) : [...here, name]);
+  /** Of one recording are files of one folder; a folder is one itself. What else was chosen stays one click away. */
+  const toggle = (name: string) => {
+    if (here.includes(name)) return setChosen(here.filter((n) => n !== name));
+    const place = placeOf(name), folder = files.some((file) => file.folder && file.name === name);
+    const kept = folder ? [] : here.filter((n) => placeOf(n) === place && !files.some((file) => file.folder && file.name === n));
+    setLeft(here.filter((n) => !kept.includes(n)));
+    setChosen([...kept, name]);
+  };
   const go = () => {
     if (replaced.current || here.join("\n") !== work.files.join("\n")) newWork(here);
     location.hash = "#/look";
@@ -128,6 +138,7 @@ export function FilesPage() {
           <button type="button" disabled={!here.length} onClick={() => setChosen([])}>Choose none</button>
         </p>}
         {here.length > 0 && <p class="soft" role="status">Chosen: {here.join(", ")}.</p>}
+        {here.length > 0 && left.length > 0 && <p class="row soft">No longer: {left.join(", ")}. <button type="button" onClick={() => { setChosen([...here, ...left]); setLeft([]); }}>Choose this, too</button></p>}
         <div class="next"><button type="button" class="main" disabled={!here.length} onClick={go}>Look into {here.length ? plural(here.length, "file") : "them"}</button></div>
       </>}
     </Part>

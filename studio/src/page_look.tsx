@@ -2,9 +2,9 @@
 
 import { useEffect, useId, useMemo, useState } from "preact/hooks";
 import { api, type Reading } from "./api";
-import { duration, number, plural, stamp } from "./format";
+import { capital, duration, number, plural, stamp } from "./format";
 import { Plan, type Line } from "./plan";
-import { setWork, useShared, type Point } from "./store";
+import { setWork, useShared, type Point, type Work } from "./store";
 import { Traces, TrimBar, type Panel } from "./traces";
 import type { Finding, Kind, LogFound, Look, Question, Span, Stream } from "./types";
 import { Ask, Busy, Control, Empty, Findings, More, Page, Part, Table, Trouble, useRequest } from "./ui";
@@ -45,6 +45,22 @@ export function answerLog(set: Keys, log: Keys, file: string | null = null) {
   setWork({ log: merged, ...(axes !== undefined ? { axes } : {}) });
 }
 
+/** What was said of the files: of one alone, or of all. */
+export function saidOf(work: Work): { file: string | null; key: string; words: string }[] {
+  const { files: _, ...common } = { ...work.log, ...(work.axes ? { axes: work.axes } : {}) } as Keys;
+  const told = (file: string | null, keys: Keys) => Object.entries(keys).map(([key, value]) => ({ file, key, words: `${file ? `${file} ` : ""}${key.replaceAll("_", " ")}: ${typeof value === "object" ? JSON.stringify(value) : value === "" ? "none" : String(value)}` }));
+  return [...told(null, common), ...Object.entries(ofFiles(work.log)).flatMap(([name, keys]) => told(name, keys))];
+}
+
+function Answers() {
+  const { work } = useShared();
+  const said = saidOf(work);
+  if (!said.length) return null;
+  return <Part title="Your answers"><ul class="list">{said.map(({ file, key, words }) => <li class="item" key={words}>
+    <span class="name">{words}</span><button type="button" aria-label={`Take back: ${words}`} onClick={() => answerLog({ [key]: null }, work.log, file)}>Take back</button>
+  </li>)}</ul></Part>;
+}
+
 export function LookPage() {
   const { work } = useShared();
   const look = useLook();
@@ -57,7 +73,7 @@ export function LookPage() {
     lead={found ? inOneSentence(found) : undefined}>
     {look.busy && <Busy>{found ? "Looking again…" : "Looking into the log: streams, clock, units, axes, rests…"}</Busy>}
     <Trouble problem={look.problem} retry={look.again} />
-    {look.problem && <ReadingForm files={work.files} />}
+    {look.problem && <><Answers /><ReadingForm files={work.files} /></>}
     {found && <Found look={found} reading={reading} />}
   </Page>;
 }
@@ -115,12 +131,17 @@ const WORDS: Record<string, string> = {
 
 const wordsOf = (s: Stream) => WORDS[s.name] ?? (ofCrash(s) ? s.name.replace(/^crash-/, "channels of a crash, ") : s.name);
 
+const UNUSED = /^io\.attitude-(not-used|of-other-phone)$/;
+
 function Found({ look, reading }: { look: Look; reading: Reading }) {
   const { work } = useShared();
   const records = recordsOf(look);
   // That a record is no log of inertial samples is no fault of it; what is wrong with a channel is.
   const faults = [...look.logs.flatMap((log) => log.faults.filter((f) => !records.includes(log) || f.severity !== "error").map((f) => ({ ...f, file: f.file ?? log.name }))), ...look.between.filter((f) => f.severity !== "note")];
-  const notes = [...look.between.filter((f) => f.severity === "note"), ...look.logs.flatMap((log) => log.notes.map((f) => ({ ...f, file: f.file ?? log.name })))];
+  const told = [...look.between.filter((f) => f.severity === "note"), ...look.logs.flatMap((log) => log.notes.map((f) => ({ ...f, file: f.file ?? log.name })))];
+  // That an attitude of the file is left unused is nothing to find in a closed list.
+  const notes = told.filter((f) => !UNUSED.test(f.code));
+  faults.push(...told.filter((f) => UNUSED.test(f.code)));
   const streams = look.streams.filter((s) => s.rows > 1 && s.columns.length > 0);
   const imu = streams.find((s) => s.name === "imu") ?? streams[0];
   const several = look.logs.length > 1;
@@ -136,6 +157,7 @@ function Found({ look, reading }: { look: Look; reading: Reading }) {
       {needed.map(ask)}
     </Part>}
     {optional.length > 0 && <Part title="Is this right?">{!needed.length && whose}{optional.map(ask)}</Part>}
+    <Answers />
     <Part title="What is in it">
       {records.length > 0 && look.streams.some(certain) && <p>{records.map((log) => log.name).join(", ")}: {records.length > 1 ? "records" : "a record"} of a crash. Choose “Crash” on the next page.</p>}
       <Contents look={look} />
@@ -147,24 +169,35 @@ function Found({ look, reading }: { look: Look; reading: Reading }) {
     </Part>}
     <Part title="How it was read">
       <p>Units and axes, with the reason for each. Correct what is wrong: the log is looked at again.</p>
-      {look.logs.filter((log) => log.read_as.length > 0).map((log) => <Table key={log.name} caption={log.name} head={["Quantity", "Column", "Unit", "Why"]}
-        rows={log.read_as.map((r) => [r.quantity, r.source, r.unit ?? "–", r.why])} />)}
+      {look.logs.filter((log) => log.read_as.length > 0).map((log, _, all) => all.length > 1 ? <More key={log.name} title={log.name}><ReadAs log={log} /></More> : <ReadAs key={log.name} log={log} />)}
       <ReadingForm files={look.logs.map((log) => log.name)} />
     </Part>
-    <Places look={look} reading={reading} streams={streams} />
+    {streams.length > 0 && <Places look={look} reading={reading} streams={streams} />}
     <div class="next"><a class="button main" href="#/choose">Choose what to find out</a></div>
   </>;
+}
+
+/** Columns that were read in the same way, one after the other, share a row. */
+function ReadAs({ log }: { log: LogFound }) {
+  const rows: LogFound["read_as"] = [];
+  for (const one of log.read_as) {
+    const last = rows[rows.length - 1];
+    if (last?.why === one.why && last.unit === one.unit) rows[rows.length - 1] = { ...last, quantity: `${last.quantity}, ${one.quantity}`, source: `${last.source}, ${one.source}` };
+    else rows.push(one);
+  }
+  return <Table stack caption={log.name} head={["Quantity", "Column", "Unit", "Why"]} rows={rows.map((r) => [r.quantity, r.source, r.unit ?? "–", r.why])} />;
 }
 
 function Contents({ look }: { look: Look }) {
   const zero = zeroOf(look);
   return <>
-    <Table head={["Stream", "File", "Samples", "Rate", "From", "To", "Gaps"]} numeric={[2, 3, 4, 5, 6]}
+    {!look.streams.length && <Empty>{look.questions.some((q) => !q.optional) ? "Nothing can be shown before the question above is answered." : "No samples and no fixes were found."}</Empty>}
+    {look.streams.length > 0 && <Table stack head={["Stream", "File", "Samples", "Rate", "From", "To", "Gaps"]} numeric={[2, 3, 4, 5, 6]}
       rows={look.streams.map((s) => {
         const told = look.logs.find((log) => log.name === s.file)?.streams.find((one) => one.name === s.name);
         return [wordsOf(s), s.file ?? "", s.rows.toLocaleString("en"), rateOf(look, s) ? `${number(rateOf(look, s)!, 4)} Hz` : "–",
           `${stamp(s.from_s - zero, 1)} s`, `${stamp(s.to_s - zero, 1)} s`, told?.gaps ? `${told.gaps}, ${duration(told.lost_s)} lost` : "none"];
-      })} />
+      })} />}
     {saidOfZero(look, zero) && <p class="soft">{saidOfZero(look, zero)}</p>}
     <dl class="facts">
       {look.logs.map((log) => <Facts key={log.name} log={log} zero={zero} alone={look.logs.length === 1} />)}
@@ -197,7 +230,7 @@ const QUANTITIES: [RegExp, string][] = [
 ];
 
 /** "speed_sd": "Speed, standard deviation". */
-const inWords = (name: string) => name.replace(/_sd$/, ", standard deviation").replaceAll("_", " ").replace(/^[a-z]/, (c) => c.toUpperCase());
+const inWords = (name: string) => capital(name.replace(/_sd$/, ", standard deviation").replaceAll("_", " "));
 
 /** Components of a north-east-down velocity. */
 const TOWARDS: Record<string, string> = { VN: "north", VE: "east", VD: "down" };

@@ -4,7 +4,7 @@
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { api, part } from "./api";
 import { Attitude, fromEuler } from "./attitude";
-import { bytes, date, plural, stamp } from "./format";
+import { bytes, capital, date, plural, stamp } from "./format";
 import { indexOf, METERS_PER_DEG, Plan } from "./plan";
 import { REFERENCE, Traces, type Panel } from "./traces";
 import type { Finding, KeyNumber, RunDetail, Series as SeriesData, Span, Track } from "./types";
@@ -108,7 +108,7 @@ function Numbers({ numbers: all }: { numbers: KeyNumber[] }) {
   const large = main.length ? main : all.filter((one) => one.value && one.bound).slice(0, 4);
   return <>
     {large.length > 0 && <dl class="keys">
-      {large.map((one) => <div key={`${one.group} ${one.label}`}><dt>{[nameOf(one).replace(/^./, (c) => c.toUpperCase()), one.group.toLowerCase() === "at the end" ? "at the end" : "", one.group.startsWith("Errors against") ? "against the reference" : ""].filter(Boolean).join(" ")}</dt>
+      {large.map((one) => <div key={`${one.group} ${one.label}`}><dt>{[capital(nameOf(one)), one.group.toLowerCase() === "at the end" ? "at the end" : "", one.group.startsWith("Errors against") ? "against the reference" : ""].filter(Boolean).join(" ")}</dt>
         <dd>{one.value ? <>{one.value} <small>{one.bound} {one.bound ? one.bound_unit : one.unit}</small></> : said(one)}</dd>
         {MEANS.filter(([pattern]) => pattern.test(one.label)).map(([, words]) => <dd class="means" key={words}>{words}</dd>)}
         {nameOf(one) !== one.label && <dd class="means">{one.label.slice(nameOf(one).length + 2)}</dd>}

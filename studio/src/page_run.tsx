@@ -18,15 +18,18 @@ export function JobPage({ id }: { id: string }) {
   const [, tick] = useState(0);
   const job = state?.jobs.find((one) => one.id === id);
   const going = job?.state === "running" || job?.state === "waiting";
+  const [whole, setWhole] = useState<string[]>([]);
+  const take = (one: Job) => { putJob(one); setWhole(one.output ?? []); };
+  // Its events bring the last lines alone.
   useEffect(() => {
-    api.job(id).then(putJob, (error: unknown) => setProblem(problemOf(error))).finally(() => setAsked(true));
-  }, [id]);
+    api.job(id).then(take, (error: unknown) => setProblem(problemOf(error))).finally(() => setAsked(true));
+  }, [id, job?.state, job?.tail.join("\n")]);
   useEffect(() => {
     if (!going) return;
     const timer = setInterval(() => {
       tick((n) => n + 1);
       // Without events the job is asked for.
-      if (connected === false) api.job(id).then(putJob, () => undefined);
+      if (connected === false) api.job(id).then(take, () => undefined);
     }, 1000);
     return () => clearInterval(timer);
   }, [going, connected]);
@@ -34,6 +37,7 @@ export function JobPage({ id }: { id: string }) {
     if (!asked) return <Busy>Asking for the run…</Busy>;
     return <Page title="No such run"><Trouble problem={problem} /><Empty><a href="#/files">To files and results</a></Empty></Page>;
   }
+  const printed = whole.length >= job.tail.length ? whole : job.tail;
   const begun = seconds(job.begun), ended = seconds(job.ended);
   const lasted = begun === null ? null : (ended ?? Date.now() / 1000) - begun;
   const cancel = async () => {
@@ -59,7 +63,7 @@ export function JobPage({ id }: { id: string }) {
       {going && <p class="help">You may close this page: the run goes on, and its result will be in the folder.</p>}
     </div>
     <Part title="What it prints">
-      {job.tail.length ? <pre class="tail" tabIndex={0} aria-label="Last lines of the output">{job.tail.join("\n")}</pre> : <Empty>Nothing yet.</Empty>}
+      {printed.length ? <pre class="tail" tabIndex={0} aria-label="The output">{printed.join("\n")}</pre> : <Empty>Nothing yet.</Empty>}
     </Part>
     <Part title="The same from a terminal"><Command text={job.command} /></Part>
   </Page>;

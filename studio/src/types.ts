@@ -17,6 +17,8 @@ export interface Job {
   id: string; kind: string; name: string; state: JobState; stage: string | null; share: number | null;
   begun: number | string | null; ended: number | string | null; command: string; run: string | null;
   error: Problem | null; tail: string[];
+  /** All lines of what it prints, where it is asked for alone; `tail` are the last. */
+  output?: string[];
   live?: { address: string; qr?: string; token?: string | null; warning?: string | null } | null;
 }
 
@@ -34,6 +36,10 @@ export interface Question {
   remedy?: string | null;
   /** Numbers of a list: 3 of a position. */
   count?: number;
+  /** An answer that could be. */
+  example?: string;
+  /** The value as it is while it is open. */
+  open?: unknown;
 }
 
 export interface Finding {
@@ -92,7 +98,7 @@ export interface Kind {
 }
 
 export interface Proposal {
-  toml: string; questions: Question[]; findings: Finding[]; to_check?: Question[]; found?: string[];
+  toml: string; questions: Question[]; findings: Finding[]; to_check?: Question[]; /** Further values that nothing was found of. */ assumed?: Question[]; found?: string[];
   others?: { toml: string; name: string }[];
   /** Questions about the files, without whose answers there is no text. */
   choose?: Question[];

@@ -4,7 +4,7 @@
 import type { ComponentChildren, JSX } from "preact";
 import { useEffect, useId, useRef, useState } from "preact/hooks";
 import { problemOf } from "./api";
-import { number, shown } from "./format";
+import { capital, number, shown } from "./format";
 import type { Choice, Field, Finding, Option, Problem, Question } from "./types";
 
 /** The state of one request: begun again when `keys` change, an old answer never over a new one. */
@@ -83,7 +83,14 @@ const SEVERITY: Record<string, { word: string; look: string }> = {
 };
 
 /** Errors and warnings as a list; notes behind one line, where they are many. */
-export function Findings({ findings, none }: { findings: Finding[]; none?: string }) {
+export function Findings({ findings: all, none }: { findings: Finding[]; none?: string }) {
+  // One that several files have names them all.
+  const byText = new Map<string, Finding>();
+  for (const one of all) {
+    const key = `${one.severity} ${one.text ?? one.sentence ?? one.code} ${one.remedy}`, same = byText.get(key);
+    byText.set(key, same?.file && one.file && same.file !== one.file ? { ...same, file: `${same.file}, ${one.file}` } : same ?? one);
+  }
+  const findings = [...byText.values()];
   if (!findings.length) return none ? <Empty>{none}</Empty> : null;
   const of = (...severities: string[]) => findings.filter((one) => severities.includes(one.severity));
   const notes = findings.filter((one) => !["error", "warning"].includes(one.severity));
@@ -105,11 +112,14 @@ function OneFinding({ finding: one }: { finding: Finding }) {
   </li>;
 }
 
-/** A text as a sentence; the name of a file or of a measurement at its beginning stays as it is. */
-export const sentence = (text: string) => (/^[\w-]+\.\w/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1)) + (/[.?!]$/.test(text) ? "" : ".");
+/** A text as a sentence. */
+export const sentence = (text: string) => capital(text) + (/[.?!]$/.test(text) ? "" : ".");
 
-/** An open question: answered by one click, or by a value with its unit. */
-export function Ask({ question, onAnswer, list, take, of }: { question: Question; onAnswer: (set: Record<string, unknown>) => void; list?: boolean; take?: boolean; /** The file that it is about, where there are several. */ of?: string | null | undefined }) {
+/** Answers above this number are in a list that opens. */
+const MANY = 10;
+
+/** An open question: answered by one click, or by a value with its unit; `onAnswer` says what is wrong with it. */
+export function Ask({ question, onAnswer, list, take, of }: { question: Question; onAnswer: (set: Record<string, unknown>) => void | Promise<string | void>; list?: boolean; take?: boolean; /** The file that it is about, where there are several. */ of?: string | null | undefined }) {
   const own = useRef<HTMLDivElement>(null);
   useEffect(() => { if (take) own.current?.focus(); }, [take]);
   const [text, setText] = useState("");
@@ -118,26 +128,27 @@ export function Ask({ question, onAnswer, list, take, of }: { question: Question
   const count = question.count ?? 3;
   // A position is along the axes of the vehicle; of other lists the question says what they are.
   const named = count === 3 && /(^|\.)(position|lever_arm|contact)_m$/.test(question.key ?? "") ? "Forward, right, down: three" : `${count}`;
-  const example = `${named} numbers with commas between them, such as ${[0.3, 0, -1.2, 0, 0, 0].slice(0, count).join(", ")}`;
+  const example = list && question.free !== "text" ? `${named} numbers with commas between them, such as ${question.example?.replace(/[[\]]/g, "") || [0.3, 0, -1.2, 0, 0, 0].slice(0, count).join(", ")}.`
+    : question.example ? `For example: ${question.example}.` : "";
+  const give = async (set: Record<string, unknown>) => { setFault(""); setFault(await onAnswer(set) || ""); };
   const submit = (event: Event) => {
     event.preventDefault();
     if (!question.key || text.trim() === "") return setFault("Write an answer first.");
     const value = question.free === "text" ? text : parseNumbers(text);
-    if (list && question.free !== "text" && (!Array.isArray(value) || value.length !== count)) return setFault(`${example}.`);
+    if (list && question.free !== "text" && (!Array.isArray(value) || value.length !== count)) return setFault(example);
     if (value === null || (Array.isArray(value) && !list)) return setFault("This has to be a number, such as 0.25.");
-    setFault("");
-    onAnswer({ [question.key]: value });
+    void give({ [question.key]: value });
   };
   return <div class="ask" role="group" aria-labelledby={id} ref={own} tabIndex={-1}>
     <p id={id}>{of && <span class="of">{of}: </span>}{sentence(question.text)}</p>
     {question.remedy && <p class="help">{sentence(question.remedy)}</p>}
-    {question.choices.length > 0 && <div class="row">
-      {question.choices.map((choice: Choice) => <button type="button" key={choice.label} onClick={() => onAnswer(choice.set)}>{choice.label}{choice.likely ? " (likely)" : ""}</button>)}
+    {question.choices.length > MANY ? <select aria-label="Choose one" onChange={(e) => void give(question.choices[e.currentTarget.selectedIndex - 1]?.set ?? {})}><option>choose one</option>{question.choices.map((choice) => <option key={choice.label}>{choice.label}</option>)}</select> : question.choices.length > 0 && <div class="row">
+      {question.choices.map((choice: Choice) => <button type="button" key={choice.label} onClick={() => void give(choice.set)}>{choice.label}{choice.likely ? " (likely)" : ""}</button>)}
     </div>}
-    {question.free && list && question.free !== "text" && <p class="help" id={`${id}e`}>{example}.</p>}
+    {question.free && example && <p class="help" id={`${id}e`}>{example}</p>}
     {question.free && <form class="row" onSubmit={submit}>
       <span class="withunit">
-        <input type="text" aria-label="Your answer" inputMode={question.free === "number" && !list ? "decimal" : "text"} value={text} aria-invalid={fault !== ""} aria-describedby={fault ? `${id}f` : list ? `${id}e` : undefined} onInput={(e) => setText(e.currentTarget.value)} />
+        <input type="text" aria-label="Your answer" inputMode={question.free === "number" && !list ? "decimal" : "text"} value={text} aria-invalid={fault !== ""} aria-describedby={fault ? `${id}f` : example ? `${id}e` : undefined} onInput={(e) => setText(e.currentTarget.value)} />
         {question.unit && <span class="unit">{question.unit}</span>}
       </span>
       <button type="submit">Answer</button>
@@ -254,7 +265,7 @@ export function Options({ options, folded = false }: { options: Option[]; folded
   </>;
 }
 
-const withUnit = (value: unknown, unit: string) => written(value) + (unit && /\d/.test(written(value)) ? `\u00a0${unit}` : "");
+export const withUnit = (value: unknown, unit: string) => written(value) + (unit && /\d/.test(written(value)) ? `\u00a0${unit}` : "");
 
 /** A value of an option, in full. */
 export function written(value: unknown): string {

@@ -23,10 +23,10 @@ await run(async () => {
   await see(/is a configuration for these files/);
   await see(/The truth is a delta-V of 63\.1 km\/h/);
   await look("newcomer-0-offered");
-  await click("Use crash-case.toml");
+  await click("Use sample-crash/case.toml");
   await page.locator(".ask").first().waitFor({ state: "detached" });
   await see("in step with the form");
-  await see(/^This is crash-case\.toml of the folder\./);
+  await see(/^This is sample-crash\/case\.toml of the folder\./);
   assert.equal(await page.getByText("What was found while proposing it").count(), 0);
   await look("newcomer-0-used");
   await click("Run it");
@@ -48,9 +48,18 @@ await run(async () => {
   await page.getByRole("button", { name: "Choose none" }).press("Enter");
   assert.equal(await ticks.getByRole("checkbox", { checked: true }).count(), 0);
   await page.getByRole("button", { name: "Choose all" }).press("Enter");
-  assert.equal(await ticks.getByRole("checkbox", { checked: false }).and(page.locator(".item input")).count(), 0);
-  assert.equal(await ticks.getByText("crash-case.toml").count(), 0);
+  assert.equal(await ticks.locator("> .item input:not(:checked)").count(), 0);
+  assert.equal(await ticks.getByText(/\.toml/).count(), 0);
   done("all of the folder by the keyboard");
+  // A folder, and then a file of it: not both, but by a click.
+  await page.getByRole("button", { name: "Choose none" }).click();
+  const [folder, record] = ["sample-crash", "sample-crash/imu1_gyro.csv"].map((name) => ticks.locator(".item", { has: page.getByText(name, { exact: true }) }).getByRole("checkbox"));
+  await folder.check();
+  await ticks.locator("details:not([open]) > summary").click();
+  await record.check();
+  assert.equal(await folder.isChecked(), false, "what was chosen before is not");
+  await click("Choose this, too");
+  assert.ok(await folder.isChecked() && await record.isChecked());
   await page.locator("input[type=file]").setInputFiles(files);
   await page.locator(".sending").waitFor({ state: "detached" });
   await click(/^Look into 2/);
@@ -59,6 +68,9 @@ await run(async () => {
   const ask = (name) => page.locator(".ask", { hasText: name });
   for (const name of names) await ask(name).waitFor();
   await look("newcomer-2-two-recorders");
+  await ask(names[0]).getByRole("button", { name: "x forward, y left, z up" }).click();
+  await ask(names[0]).waitFor({ state: "detached" });
+  await page.getByRole("button", { name: `Take back: ${names[0]} axes: forward-left-up` }).click();
   await ask(names[0]).getByRole("button", { name: "x forward, y left, z up" }).click();
   await ask(names[0]).waitFor({ state: "detached" });
   await ask(names[1]).getByRole("button", { name: /^x right, y forward, z up/ }).click();

@@ -52,6 +52,8 @@ class Studio:
 
     folder: Path
     limits: dict[str, Any] = field(default_factory=dict)
+    #: Whether it shows its page, for a browser, and not one of a line.
+    whole: bool = False
     process: subprocess.Popen[str] = field(init=False)
     url: str = ""
     left: int = 0
@@ -60,14 +62,18 @@ class Studio:
         self.start()
 
     def start(self) -> None:
-        page = self.folder.parent / "page"
-        page.mkdir(exist_ok=True)
-        (page / "index.html").write_text("<!doctype html><title>studio</title>", encoding="utf-8")
+        env = dict(os.environ)
+        if not self.whole:
+            page = self.folder.parent / "page"
+            page.mkdir(exist_ok=True)
+            text = "<!doctype html><title>studio</title>"
+            (page / "index.html").write_text(text, encoding="utf-8")
+            env["STRAPDOWN_STUDIO_STATIC"] = str(page)
         self.process = subprocess.Popen(
             [sys.executable, "-c", START.format(limits=self.limits), str(self.folder)],
             stdout=subprocess.PIPE,
             text=True,
-            env={**os.environ, "STRAPDOWN_STUDIO_STATIC": str(page)},
+            env=env,
         )
         assert self.process.stdout is not None
         line = self.process.stdout.readline().split()
@@ -166,11 +172,11 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Studio]:
 
 
 @pytest.fixture
-def fresh(tmp_path: Path) -> Iterator[Studio]:
-    """A studio of an empty folder, for one test."""
+def fresh(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Studio]:
+    """A studio of an empty folder, for one test; with its page where the parameter is "page"."""
     folder = tmp_path / "folder"
     folder.mkdir()
-    one = Studio(folder)
+    one = Studio(folder, whole=getattr(request, "param", "") == "page")
     yield one
     one.kill()
     for path in (folder / ".strapdown-studio" / "jobs").glob("*.json"):

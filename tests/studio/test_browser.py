@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.map_files import mbtiles, png
+from tests.studio.test_recordings import EVERY, PART, chosen, copied
 from tests.studio.two_recorders import write_two_recorders
+
+from strapdown.bundle import MANIFEST, UNSEALED
 
 ROOT = Path(__file__).parents[2]
 STUDIO = ROOT / "studio"
@@ -69,16 +75,16 @@ def address(tmp_path: Path) -> Iterator[str]:
             server.terminate()
 
 
-def drive(script: str, address: str, tmp_path: Path, *words: Path) -> str:
+def drive(script: str, address: str, tmp_path: Path, *words: object, of: str = "") -> str:
     """Run a script of studio/test; its output. Pictures stay in the folder STRAPDOWN_SHOTS."""
-    shots = Path(os.environ.get("STRAPDOWN_SHOTS", tmp_path / "shots"))
+    shots = Path(os.environ.get("STRAPDOWN_SHOTS", tmp_path / "shots")) / of
     ran = subprocess.run(
         ["node", f"test/{script}", address, str(shots), *map(str, words)],
         cwd=STUDIO,
         env={**os.environ, "CHROMIUM": CHROMIUM},
         capture_output=True,
         text=True,
-        timeout=1200,
+        timeout=3600,
         check=False,
     )
     assert ran.returncode == 0, ran.stdout + ran.stderr
@@ -104,3 +110,32 @@ def test_a_newcomer_with_the_sample_and_two_recorders(address: str, tmp_path: Pa
 
 def test_a_phone_sends(address: str, tmp_path: Path) -> None:
     assert "seen: " in drive("live.mjs", address, tmp_path)
+
+
+@pytest.mark.parametrize("fresh", ["page"], indirect=True)
+@pytest.mark.parametrize("name", EVERY)
+def test_a_recording_gives_what_its_command_gives(fresh: Any, tmp_path: Path, name: str) -> None:
+    """All pages over a recording; each result is that of the command on it, byte by byte."""
+    place = copied(name, fresh)
+    sets = [json.dumps(files) for files in chosen(place, fresh)]
+    said = drive("recording.mjs", fresh.url, tmp_path, PART, *sets, of=name)
+    twin = tmp_path / "twin"
+    twin.mkdir()
+    shutil.copytree(place, twin / place.name)
+    for one in map(json.loads, re.findall(r"^result (.*)$", said, re.MULTILINE)):
+        command, result = shlex.split(one["command"]), one["name"]
+        assert command[0] == "strapdown" and command[-2:] == ["--out", result]
+        # The result proposes it with another folder, by which its page would differ.
+        assert shlex.split(one["again"]) == [*command[:-1], f"{result}-again"]
+        for file in fresh.folder.glob(f"{result}.toml"):
+            shutil.copy(file, twin)
+        subprocess.run([sys.executable, "-m", *command], cwd=twin, check=True, timeout=900)
+        made, again = contents(fresh.folder / result), contents(twin / result)
+        assert made.keys() == again.keys() and MANIFEST in made
+        assert not [file for file in made if made[file] != again[file]], command
+
+
+def contents(place: Path) -> dict[str, bytes]:
+    """Files of a result by their names: all that is sealed, and the seal."""
+    files = [path for path in place.rglob("*") if path.is_file() and path.name not in UNSEALED]
+    return {path.relative_to(place).as_posix(): path.read_bytes() for path in files}

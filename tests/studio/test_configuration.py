@@ -775,6 +775,42 @@ def test_axes_of_a_recorder_that_gravity_contradicts_are_not_taken(folder, two_r
     assert tomllib.loads(made["toml"])["units"][0]["angles_deg"] == [180.0, 0.0, "?"]
 
 
+def test_each_question_of_a_case_is_answered_in_its_range_and_can_be_asked_again(
+    folder, two_recorders
+):
+    made = propose(folder, "crash", ["one.csv"], {}, None, {})
+    asked = {one["key"]: one for one in made["questions"]}
+    assert asked["vehicle.mass_kg"]["example"] == "1450"
+    assert asked["units.0.position_m"]["example"] == "[0.62, -0.45, 0.2]"
+    headings = [one["set"] for one in asked["units.0.angles_deg"]["choices"]]
+    assert headings == [{"units.0.angles_deg": one} for one in (0, 90, 180, -90)]
+
+    def wrong(answer):
+        found = check(folder, "crash", made["toml"], answer)["errors"]
+        open_ = {one["path"] for one in found if one["code"] == "config.open-value"}
+        assert open_ == set(asked) - set(answer)
+        return [one["path"] for one in found if one["code"] != "config.open-value"]
+
+    # While others are open: the range of each, and no word of what is open.
+    assert wrong({"vehicle.mass_kg": 1450}) == []
+    assert wrong({"vehicle.mass_kg": -5}) == ["vehicle.mass_kg"]
+    assert wrong({"entry.speed_sd_km_per_h": -3}) == ["entry.speed_sd_km_per_h"]
+    assert wrong({"units.0.angles_deg": [0, 0, 1000]}) == ["units.0.angles_deg.2"]
+    for key, one in asked.items():
+        answered = edited(made["toml"], {key: 1.5})
+        assert answered != made["toml"]
+        again = edited(answered, {key: one["open"]})
+        assert tomllib.loads(again) == tomllib.loads(made["toml"]), key
+
+
+def test_all_that_a_case_assumes_is_listed(folder, two_recorders):
+    made = propose(folder, "crash", two_recorders, {}, None, {})
+    listed = {one["key"] for one in made["to_check"] + made["assumed"]}
+    assert {"vehicle.length_m", "entry.time_s", "units.0.position_sd_m"} <= listed
+    assert {"units.1.accelerometers.0.uncertainty", "units.1.gyro.uncertainty"} <= listed
+    assert len(made["assumed"]) == len(re.findall(r"# assumed\b", made["toml"]))
+
+
 def test_left_handed_axes_of_a_recorder_reverse_its_third_channel(folder, two_recorders):
     rows = np.loadtxt(folder / "one.csv", delimiter=",", skiprows=1)
     head = (folder / "one.csv").read_text().partition("\n")[0]

@@ -39,6 +39,8 @@ def test_a_sample_is_copied_and_can_be_looked_at(fresh, name):
     files = made.json["files"]
     assert all((fresh.folder / file).is_file() for file in files)
     assert fresh.ask("POST", f"api/samples/{name}").json == made.json
+    # Among the recordings that are there it is in a folder of its own.
+    assert [one.name for one in fresh.folder.glob("[!.]*")] == [f"sample-{name}"]
     kind = "crash" if name == "crash" else "navigate"
     proposed = fresh.ask("POST", "api/propose", {"kind": kind, "files": files})
     assert proposed.status == 200 and not proposed.json["choose"]
@@ -46,7 +48,7 @@ def test_a_sample_is_copied_and_can_be_looked_at(fresh, name):
     if name == "crash":
         # Its case is offered, with the truth, and nothing is open in it.
         (case,) = proposed.json["ready"]
-        assert case["name"] == "crash-case.toml" not in files
+        assert case["name"] == "sample-crash/case.toml" not in files
         assert all(f'"{file}"' in case["toml"] for file in files)
         assert re.match(r"Simulated, .* delta-V of 63\.1 km/h .* of 0\.0°\.$", case["what"])
         checked = fresh.ask("POST", "api/check", {"kind": kind, "toml": case["toml"]}).json

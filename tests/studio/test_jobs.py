@@ -16,7 +16,7 @@ import pytest
 from strapdown.errors import ConfigError
 from strapdown.studio import job_keeper, jobs
 from strapdown.studio.folder import Folder
-from strapdown.studio.jobs import AT_ONCE, ENDED, LINES, Jobs, process_began
+from strapdown.studio.jobs import AT_ONCE, ENDED, LINES, WHOLE, Jobs, process_began
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
@@ -245,6 +245,8 @@ def test_output_is_bounded_on_disk_and_in_the_answer(place):
     one = until(of, of.submit("navigate", "a", ["shout"])["id"], *ENDED, seconds=60)
     assert one["state"] == "done" and len(one["tail"]) <= LINES
     assert one["tail"][-1].startswith("59999 ")
+    whole = of.whole(one["id"])
+    assert len(whole) > LINES and sum(map(len, whole)) <= WHOLE and whole[-LINES:] == one["tail"]
     kept = list((place.state / "jobs").glob(f"{one['id']}.log*"))
     assert sum(path.stat().st_size for path in kept) <= 2 * job_keeper.MOST
 

@@ -75,6 +75,13 @@ UNUSED = "studio.reference-not-used"
 LACKS = ("alignment.", "attitude.", "navigation.", "crash.", "io.", "sensors.")
 
 
+def copied(name: str, studio: Any) -> Path:
+    """A recording in the folder of a studio."""
+    if not (DATA / name).is_dir():
+        without(name)
+    return Path(shutil.copytree(DATA / name, studio.folder / Path(name).name))
+
+
 def chosen(place: Path, studio: Any) -> Iterator[list[str]]:
     """What a person ticks of a folder: itself, or where it is no log each file of it."""
     if studio.ask("POST", "api/look", {"files": [place.name]}, wait=WAIT).status == 200:
@@ -157,12 +164,13 @@ def proposed(studio: Any, kind: str, files: list[str], found: Any, log: Any) -> 
     return answer
 
 
-@pytest.mark.parametrize("name", [*RECORDINGS, *(f"zoo/{name}" for name in ZOO)])
+#: Every recording, by its folder.
+EVERY = (*RECORDINGS, *(f"zoo/{name}" for name in ZOO))
+
+
+@pytest.mark.parametrize("name", EVERY)
 def test_a_recording_goes_through_or_is_told_why_not(fresh: Any, name: str) -> None:
-    if not (DATA / name).is_dir():
-        without(name)
-    place = fresh.folder / Path(name).name
-    shutil.copytree(DATA / name, place)
+    place = copied(name, fresh)
     seen = runs = 0
     for files in chosen(place, fresh):
         found = looked(fresh, files)

@@ -365,6 +365,16 @@ def test_the_reasons_against_a_result_stand_beside_its_verdict(tmp_path):
     assert "--" not in found["against"][1]["remedy"]
 
 
+def test_a_finding_about_an_algorithm_names_it_and_one_about_a_file_does_not(tmp_path):
+    pole = Finding("attitude.through-vertical-pitch", quantity="euler", time=3.0, apart_deg=0.0)
+    axes = Finding("io.axes-not-stated", file="log.csv", quantity="axes")
+    place, whole = tmp_path / "a", {"name": "a"}
+    with write_bundle(place, command="attitude", configuration=whole, inputs=(), seals=[]) as out:
+        write_json(out / "attitude.json", {"findings": [pole.plain(), axes.plain()]})
+    texts = [one["text"] for one in runs.run(tmp_path, "a")["findings"]]
+    assert texts[0].startswith("euler: passed through") and texts[1] == axes.sentence("studio")
+
+
 def test_the_status_of_a_heading_stands_beside_its_value_and_the_verdict(tmp_path):
     """As the run says it, from the values of its heading integrity."""
     whole = {"name": "a", "navigation": {}}

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import ValidationError
 
-from strapdown.config.spec import Fault, Spec, faults_of, fields_at, refusal
+from strapdown.config.spec import Fault, Spec, faults_of, fields_at, located, refusal, written_path
 from strapdown.config.toml_file import KeyPath, TomlFile, place_of, read_toml, shown, shown_key
 from strapdown.errors import ConfigError, Finding
 
@@ -78,6 +78,24 @@ class FileSpec(Spec):
         given = {key: value for key, value in instead.items() if value is not None}
         named = {**table, **given, "name": file.path.stem}
         return cls._checked(named, {**file.table, **given}, file, faults, files)
+
+    @classmethod
+    def faults_of_stated(cls, file: TomlFile) -> list[Finding]:
+        """Faults of the values of a file of which others are still ``"?"``, without its files."""
+        open_keys = set(_open(file.table, ()))
+        try:
+            cls.model_validate({**file.table, "name": file.path.stem})
+        except ValidationError as error:
+            faults = faults_of(error, cls, file.table)
+        else:
+            return []
+        found = []
+        for fault in faults:
+            path = written_path(file.table, fault.path)
+            # A table with an open value may be wrong by it alone.
+            if not any(key[: len(path)] == path[: len(key)] for key in open_keys):
+                found.append(located(fault, file.table, file))
+        return found
 
     @classmethod
     def _checked(

@@ -520,7 +520,7 @@ def refusal(
     `faults`: one or more. `table`: as the user wrote it. `file`: its lines, in whose order the
     faults are listed; without it they are located by keys alone.
     """
-    found = [_located(one, table, file) for one in faults]
+    found = [located(one, table, file) for one in faults]
     if len(found) == 1:
         return ConfigError(found[0])
     found = list(dict.fromkeys(found))
@@ -529,7 +529,8 @@ def refusal(
     return ConfigError("config.several", file=name, count=len(found), faults=found)
 
 
-def _located(fault: Fault, table: Mapping[str, Any], file: TomlFile | None) -> Finding:
+def located(fault: Fault, table: Mapping[str, Any], file: TomlFile | None) -> Finding:
+    """Return a fault with its place in the file, or in the table alone, as `refusal`."""
     path, what = fault.path, fault.what
     if isinstance(what, Finding):
         # A lower layer may name a part of the value.

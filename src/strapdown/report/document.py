@@ -239,8 +239,12 @@ def run_again(name: str) -> tuple[Block, ...]:
 
 
 def capital(text: str) -> str:
-    """Return a text with a capital first letter."""
-    return f"{text[:1].upper()}{text[1:]}"
+    """Return a text with a capital first letter; that of a name, ``gnss.position``, stays."""
+    return text if _NAME.match(text) else f"{text[:1].upper()}{text[1:]}"
+
+
+#: A file or a measurement at the beginning of a text.
+_NAME = re.compile(r"[\w-]+\.\w")
 
 
 def findings_list(findings: Iterable[Finding], words: Words = "python") -> Items | Paragraph:

@@ -348,8 +348,9 @@ def write_configuration(studio: Studio, name: str, text: str, words: list[str]) 
 
 
 async def job(studio: Studio, request: Request) -> Response:
-    """State of a job."""
-    return JSONResponse(studio.jobs.shown(request.path_params["id"]))
+    """State of a job, with its whole output."""
+    number = request.path_params["id"]
+    return JSONResponse(studio.jobs.shown(number) | {"output": studio.jobs.whole(number)})
 
 
 async def states(studio: Studio, request: Request) -> Response:

@@ -17,7 +17,7 @@ from typing import Any
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
-from strapdown.bundle import named_paths
+from strapdown.bundle import named_paths, names_file
 from strapdown.config.reading import FileSpec
 from strapdown.config.toml_file import (
     DEEPEST,
@@ -38,6 +38,8 @@ __all__ = ["check", "checked", "command", "edited", "propose"]
 
 #: Configurations of the folder that are offered at most.
 MOST_READY = 5
+#: Code of a value that is still a question mark.
+OPEN = "config.open-value"
 #: Longest text of a configuration, characters; keys that are changed at once.
 LONGEST, MOST = 1 << 20, 200
 
@@ -87,6 +89,7 @@ def propose(
         "toml": text,
         "questions": [q for q in _questions(text, first.asked) if q["key"] not in answers],
         "to_check": _questions(text, first.to_check),
+        "assumed": _questions(text, _assumed(text, first.to_check)),
         "findings": [told(finding) for finding in first.findings],
         "found": list(first.found),
         "choose": list(first.choose),
@@ -102,13 +105,18 @@ def propose(
 
 def _ready(place: Folder, kind: Kind, names: Sequence[str]) -> Iterator[dict[str, Any]]:
     """Yield the configurations of the folder for such a run over these files."""
-    written = [path for one in place.entries() if (path := Path(one.path)).suffix == ".toml"]
+    root = [Path(one.path) for one in place.entries()]
+    folders = {path if path.is_dir() else path.parent for path in map(place.file, names)}
+    beside = [path for one in folders - {place.path} for path in one.glob("*.toml")]
+    written = [path for path in (*root, *beside) if path.suffix == ".toml"]
     count = 0
     for path in sorted(written, key=lambda one: one.stat().st_mtime, reverse=True)[:MOST]:
         with suppress(ConfigError, DataError, OSError, UnicodeDecodeError):
             if path.stat().st_size > LONGEST:
                 continue
             text = path.read_text(encoding="utf-8")
+            if path.parent != place.path:
+                text = _from_root(place, path, text)
             table = parse_toml(path, text).table
             read = [Path(name) for name in named_paths(table)]
             if not any(one.is_relative_to(name) for one in read for name in names):
@@ -116,7 +124,7 @@ def _ready(place: Folder, kind: Kind, names: Sequence[str]) -> Iterator[dict[str
             spec = checked(place.path, kind, text, path.stem)
             said = {key: str(getattr(spec, key, "") or "") for key in ("title", "description")}
             yield {
-                "name": path.name,
+                "name": place.name_of(path),
                 "title": said["title"],
                 "what": said["description"],
                 "toml": text,
@@ -124,6 +132,16 @@ def _ready(place: Folder, kind: Kind, names: Sequence[str]) -> Iterator[dict[str
             count += 1
         if count == MOST_READY:
             return
+
+
+def _from_root(place: Folder, path: Path, text: str) -> str:
+    """Return a configuration in a folder with its files named from that of the studio."""
+    table, inside = parse_toml(path, text).table, place.name_of(path.parent)
+    document = tomlkit.parse(text)
+    for keys, value in _flat(table, ()):
+        if names_file(str(keys[-1]), value):
+            _change(document, dotted(keys), f"{inside}/{value}", tomlkit.table)
+    return tomlkit.dumps(document)
 
 
 def check(
@@ -152,6 +170,9 @@ def check(
         checked(folder, one, text, name)
     except ConfigError as error:
         errors = list(_faults(error.finding, key_lines(text)))
+        if any(one["code"] == OPEN for one in errors):
+            for fault in one.form.faults_of_stated(parse_toml(_path(folder, name), text)):
+                errors += _faults(fault, key_lines(text))
     values = {dotted(path): value for path, value in _flat(table, ())}
     was = _found_before(text)
     return {"toml": text, "values": values, "was": was, "errors": errors, "name": named}
@@ -459,20 +480,60 @@ def _faults(finding: Finding, lines: Mapping[KeyPath, Sequence[int]]) -> Iterato
         }
 
 
+#: An example in the remark on a value: a text, a list, or numbers and what they are of.
+EXAMPLE = re.compile(r"\be\.g\. (\"[^\"]*\"|\[[^\]]*\]|-?\d[^;:]*)")
+
+
 def _questions(text: str, asked: Sequence[Asked]) -> list[dict[str, Any]]:
     """Return open values of a text as questions, each with its key path."""
-    by_line: dict[int, list[KeyPath]] = {}
-    for path, numbers in key_lines(text).items():
-        for number in numbers:
-            by_line.setdefault(number, []).append(path)
     written = text.split("\n")
     found = []
+    by_line = _paths_by_line(text)
     for one in asked:
         paths = [p for p in by_line.get(one.line, []) if p and p[-1] == one.key]
         key = dotted(paths[0]) if paths else one.key
         line = written[one.line - 1] if one.line <= len(written) else ""
         count = line.partition("#")[0].count("?") or 1
-        found.append(open_question(one, key, unit_of_key(one.key), count))
+        example = EXAMPLE.search(_remark(written, one.line))
+        said = "" if example is None or "e.g." in one.what else example[1].strip('"')
+        value = _literal(line.partition("=")[2].partition("  # ")[0].strip())
+        question = open_question(one, key, unit_of_key(one.key), count, said)
+        found.append({**question, "open": None if value is None else value.unwrap()})
+    return found
+
+
+def _paths_by_line(text: str) -> dict[int, list[KeyPath]]:
+    found: dict[int, list[KeyPath]] = {}
+    for path, numbers in key_lines(text).items():
+        for number in numbers:
+            found.setdefault(number, []).append(path)
+    return found
+
+
+def _remark(written: Sequence[str], line: int) -> str:
+    """Return the remark beside the value of a line, or without one the comment right above it."""
+    beside = written[line - 1].rpartition("  # ")[2] if "  # " in written[line - 1] else ""
+    above: list[str] = []
+    for one in reversed(written[: line - 1]):
+        # What a value is known by begins a remark; without that a remark is of the line alone.
+        if beside or not one.startswith("# ") or (above and REMARK.match(above[0])):
+            break
+        above.insert(0, one)
+    return beside or " ".join(one.removeprefix("# ") for one in above)
+
+
+#: How a remark begins that is more than words.
+REMARK = re.compile(rf"# *(?:found|assumed|yours|{OWN})")
+
+
+def _assumed(text: str, confirmed: Sequence[Asked]) -> list[Asked]:
+    """Return what a proposal assumes and does not ask to confirm."""
+    written, known = text.split("\n"), {one.line for one in confirmed}
+    found = []
+    for line, paths in _paths_by_line(text).items():
+        said = re.match(r"assumed\b[:,]? ?(.*)", _remark(written, line))
+        if said and paths[0] and line not in known and " = " in written[line - 1]:
+            found.append(Asked(line, str(paths[0][-1]), said[1]))
     return found
 
 

@@ -36,8 +36,8 @@ __all__ = ["Job", "Jobs", "process_began"]
 AT_ONCE, REMEMBERED, WAITING = 2, 100, 50
 #: Time from an interrupt to the end by force, s; of a live run, which then writes what it received.
 GRACE, GRACE_LIVE = 8.0, 120.0
-#: Bytes and lines of output that a job shows.
-TAIL, LINES = 16 << 10, 40
+#: Bytes and lines of output that a job shows, and bytes of it as a whole.
+TAIL, LINES, WHOLE = 16 << 10, 40, 1 << 18
 #: States that a job does not leave.
 ENDED = ("done", "failed", "cancelled", "lost")
 
@@ -207,6 +207,12 @@ class Jobs:
             "tail": self._tail(job),
             "live": self._live(job),
         }
+
+    def whole(self, number: str) -> list[str]:
+        """Lines of the output of a job: all of them, or the last of a very long one."""
+        with self._lock:
+            path = self.output(number)
+        return _last(path, WHOLE).decode("utf-8", "replace").splitlines()
 
     def output(self, number: str) -> Path:
         """File of the output of a job."""

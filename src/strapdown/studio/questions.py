@@ -11,6 +11,7 @@ from typing import Any
 from strapdown.config.toml_text import Asked, Offered
 from strapdown.errors import Finding
 from strapdown.formats.recording import PLACEHOLDERS
+from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
 
 __all__ = [
@@ -192,17 +193,36 @@ def foot_question(foot: bool) -> dict[str, Any]:
     return {**_question(finding, "", FOOT, choices, None), "file": None}
 
 
-def open_question(asked: Asked, key: str, unit: str, count: int) -> dict[str, Any]:
+#: Usual answers to open values of a configuration; a unit is one of angular rates in a gyro.
+USUAL: dict[str, Sequence[Any]] = {
+    "time_unit": ("s", "ms", "us"),
+    "speed_unit": ("km/h", "mph", "m/s"),
+    "force_unit": ("N", "kN", "lbf", "kip"),
+    "unit": ("m/s2", "g"),
+    "gyro.unit": ("deg/s", "rad/s"),
+    "angles_deg": (0, 90, 180, -90),
+}
+
+
+def open_question(
+    asked: Asked, key: str, unit: str, count: int, example: str = ""
+) -> dict[str, Any]:
     """Return the question for a value of a proposed configuration that only a person knows.
 
     `count`: numbers that it has, where it is a list.
     """
+    *_, table, name = ("", *key.split("."))
+    usual = USUAL.get(f"{table}.{name}", USUAL.get(name, ())) if count == 1 else ()
+    if key == "sensors.sensor":
+        usual = [one for one in SENSORS if load_sensor(one).grade != "crash"]
     return {
         **_blank("config.open-value", asked.what, key),
+        "choices": [_choice(f"{one} {unit}".strip(), {key: one}) for one in usual],
         "line": asked.line,
         "free": "number" if unit else "text",
         "unit": unit,
         "count": count,
+        "example": example,
     }
 
 

@@ -154,6 +154,11 @@ def run(folder: Path, name: str) -> dict[str, Any]:
     has = {str(one["name"]) for one in manifest["outputs"]}
     against = [_finding(one) for one in _list(answer.get("trust"), "against")[:MOST]]
     noticed = [_finding(one) for one in _list(answer, "findings")[:MOST]]
+    if manifest["command"] == "attitude":
+        # What is of no file is of one of several algorithms, which the report names, too.
+        for one in noticed:
+            if one["quantity"] and not one["file"]:
+                one["text"] = f"{one['quantity']}: {one['text']}"
     said = {(one["code"], one["text"]) for one in noticed}
     return {
         **summary(folder, name),

@@ -1,4 +1,4 @@
-"""Records to begin with, copied into a folder that has none where a person asks for them."""
+"""Records to begin with, copied into a folder of their own where a person asks for them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Sample:
 def _drive() -> dict[str, bytes]:
     recording = files("strapdown").joinpath("demo_data", "comma2k19")
     return {
-        f"drive-{name}": recording.joinpath(name).read_bytes()
+        name: recording.joinpath(name).read_bytes()
         for name in ("imu.csv", "gnss.csv", "reference.csv")
     }
 
@@ -59,8 +59,8 @@ def _crash() -> dict[str, bytes]:
         records = sorted(made.glob("imu1_*.csv"))
         case = (made / "case.toml").read_text(encoding="utf-8")
         truth = json.loads((made / "scenario.json").read_text(encoding="utf-8"))["impacts"][0]
-        own = {f"crash-{p.name}": p.read_bytes() for p in records}
-        return {**own, "crash-case.toml": _case_of_one(case, truth).encode()}
+        own = {p.name: p.read_bytes() for p in records}
+        return {**own, "case.toml": _case_of_one(case, truth).encode()}
 
 
 def _case_of_one(case: str, truth: Mapping[str, Any]) -> str:
@@ -72,7 +72,7 @@ def _case_of_one(case: str, truth: Mapping[str, Any]) -> str:
     # Without the comment above it, and what refers to files that are not copied.
     head = head[head.index("\ntitle = ") :]
     options = others[-1][others[-1].index("\n[options]") :]
-    text = f"{head}\n[[units]]{first}{options}".replace('\npath = "', '\npath = "crash-')
+    text = f"{head}\n[[units]]{first}{options}"
     change = math.hypot(*truth["delta_v_m_per_s"]) / KMH
     said = (
         f"Simulated, with the statements of an investigator. The truth is a delta-V of {change:.1f}"
@@ -104,19 +104,22 @@ def listed_samples() -> list[dict[str, str]]:
 
 
 def sample(folder: Path, name: str) -> dict[str, Any]:
-    """Copy a sample into the folder of the studio; return the names of its records.
+    """Copy a sample into a folder of its own, in that of the studio; return its records by name.
 
     A configuration for them is copied, too, and offered where one is proposed.
 
     ConfigError: there is no such sample, or another file has the name of one of its own.
     """
     check_choice("studio.no-such-sample", SAMPLES, quantity="name", word=name)
-    place = Folder(folder)
-    made = SAMPLES[name].make()
+    own, made = f"sample-{name}", SAMPLES[name].make()
+    place = Folder(folder).path / own
+    if place.is_symlink() or (place.exists() and not place.is_dir()):
+        raise ConfigError("studio.name-taken", file=own)
     for file, data in made.items():
-        target = place.path / file
+        target = place / file
         if target.is_symlink() or (target.exists() and target.read_bytes() != data):
-            raise ConfigError("studio.name-taken", file=file)
+            raise ConfigError("studio.name-taken", file=f"{own}/{file}")
+    place.mkdir(exist_ok=True)
     for file, data in made.items():
-        replace_file(place.path / file, data)
-    return {"files": [file for file in made if not file.endswith(".toml")]}
+        replace_file(place / file, data)
+    return {"files": [f"{own}/{file}" for file in made if not file.endswith(".toml")]}

@@ -268,7 +268,7 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         told = [f"noise while it is quiet: gyros and accelerometers {noise}"]
         page.say(f"Found: noise of {noise} while it is quiet.")
     if named is None:
-        page.key("sensor", ASK, "only you know: one of the catalogue, or a .toml file of your own")
+        page.key("sensor", ASK, "only you know: the sensor, of the catalogue or a .toml file")
     else:
         check = (
             "" if not made.guessed else "a grade by the noise of the log; name yours if you know it"

@@ -467,3 +467,9 @@ def test_a_long_run_makes_no_long_page():
     made = record(seconds=3600.0, rate=50.0)
     document = navigation_document(told(made), "out")
     assert len(document_page(document)) < 1.5e6
+
+
+def test_a_name_at_the_beginning_keeps_its_spelling() -> None:
+    assert capital("gnss.position north: rejected") == "gnss.position north: rejected"
+    assert capital("log.csv has no time") == "log.csv has no time"
+    assert capital("position: rejected") == "Position: rejected"
