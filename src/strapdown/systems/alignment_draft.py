@@ -170,7 +170,9 @@ def _sensors(page: Page) -> None:
         "heading, an accelerometer bias of 50 µg 0.003° of tilt.",
     )
     good = [s.name for s in map(load_sensor, SENSORS) if s.grade in GRADES]
-    page.key("sensor", ASK, "only you know: the sensor, of the catalogue or a .toml file")
+    page.key(
+        "sensor", ASK, "only you know: which sensor, of the catalogue or a .toml file of your own"
+    )
     page.say(
         f"Of those that can find north, or nearly: {', '.join(good)}; all: strapdown modules",
         "Alternatively, or to replace single values: tables [sensors.gyro] and [sensors.accel]: "

@@ -268,7 +268,11 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         told = [f"noise while it is quiet: gyros and accelerometers {noise}"]
         page.say(f"Found: noise of {noise} while it is quiet.")
     if named is None:
-        page.key("sensor", ASK, "only you know: the sensor, of the catalogue or a .toml file")
+        page.key(
+            "sensor",
+            ASK,
+            "only you know: which sensor, of the catalogue or a .toml file of your own",
+        )
     else:
         check = (
             "" if not made.guessed else "a grade by the noise of the log; name yours if you know it"
