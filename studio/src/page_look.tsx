@@ -2,7 +2,7 @@
 
 import { useEffect, useId, useMemo, useState } from "preact/hooks";
 import { api, type Reading } from "./api";
-import { duration, number, plural, stamp } from "./format";
+import { duration, number, plural, stamp, zeroOf } from "./format";
 import { Plan, type Line } from "./plan";
 import { setWork, useShared, type Point } from "./store";
 import { Traces, TrimBar, type Panel } from "./traces";
@@ -91,14 +91,8 @@ const spanOf = (streams: Stream[]): Span => streams.length ? [Math.min(...stream
 
 const rateOf = (look: Look, s: Stream) => s.rate_hz ?? look.logs.find((log) => log.name === s.file)?.streams.find((one) => one.name === s.name)?.rate_hz ?? null;
 
-/** Stamps from which a clock is one of dates or of the GPS week, s: times are shown from the beginning of the record. */
-const OF_DATES = 1e5;
-
-/** The stamp that is shown as zero: of a clock of dates the first, else its own zero. */
-function zeroOf(look: Look): number {
-  const first = Math.min(...look.streams.map((s) => s.from_s));
-  return Number.isFinite(first) && first >= OF_DATES ? first : 0;
-}
+/** The stamp that is shown as zero. */
+const zeroOfAll = (look: Look) => zeroOf(Math.min(...look.streams.map((s) => s.from_s)));
 
 /** When the record begins, and from when times are shown; empty where there is nothing to say. */
 function saidOfZero(look: Look, zero: number): string {
@@ -157,7 +151,7 @@ function Found({ look, reading }: { look: Look; reading: Reading }) {
 }
 
 function Contents({ look }: { look: Look }) {
-  const zero = zeroOf(look);
+  const zero = zeroOfAll(look);
   return <>
     <Table head={["Stream", "File", "Samples", "Rate", "From", "To", "Gaps"]} numeric={[2, 3, 4, 5, 6]}
       rows={look.streams.map((s) => {
@@ -241,7 +235,7 @@ function together(streams: Stream[]): Stream[] {
 const drawnWithCrash = (s: Stream) => ofCrash(s) || s.name === "imu";
 
 function Signals({ look, streams, imu, reading }: { look: Look; streams: Stream[]; imu: Stream; reading: Reading }) {
-  const zero = zeroOf(look);
+  const zero = zeroOfAll(look);
   const { work } = useShared();
   const crash = useMemo(() => together(streams), [streams]);
   const [name, setName] = useState(crash.length ? ALL : keyOf(imu));

@@ -61,6 +61,6 @@ export function JobPage({ id }: { id: string }) {
     <Part title="What it prints">
       {job.tail.length ? <pre class="tail" tabIndex={0} aria-label="Last lines of the output">{job.tail.join("\n")}</pre> : <Empty>Nothing yet.</Empty>}
     </Part>
-    <Part title="The same from a terminal"><Command text={job.command} /></Part>
+    <Part title="The same from a terminal"><Command text={job.again ?? job.command} /></Part>
   </Page>;
 }

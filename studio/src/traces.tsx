@@ -47,6 +47,16 @@ export function axisNumbers(values: number[]): string[] {
   return values.map((v) => Math.abs(v) < step * 1e-6 ? "0" : number(v, 6).replace(/\.?0+(?=e)/, ""));
 }
 
+/** Angles of which one end is the other, 0 and 360 or ±180. */
+const TURNING = /(^| )(heading|roll)(_deg)?$/;
+
+/** Greatest and least without the line from one end of a full turn to the other. */
+function broken([high, low]: (number | null)[][]): (number | null)[][] {
+  const over = (i: number) => high![i]! - low![i]! > 180 || (i > 0 && high![i - 1] != null && Math.abs(high![i]! - high![i - 1]!) > 180);
+  const kept = (values: (number | null)[]) => values.map((value, i) => value === null || over(i) ? null : value);
+  return [kept(high!), kept(low!)];
+}
+
 interface Props {
   panels: Panel[]; ask: Ask; whole: Span; askKey: string;
   /** The stamp that is shown as zero, s. */
@@ -192,7 +202,8 @@ function OnePanel(props: Props & {
 
   const data = useMemo(() => {
     const of = (name: string) => series.columns[name];
-    return [series.t, ...panel.columns.flatMap(({ name }) => [of(name)?.high ?? [], of(name)?.low ?? []])] as uPlot.AlignedData;
+    const pair = (name: string) => [of(name)?.high ?? [], of(name)?.low ?? []];
+    return [series.t, ...panel.columns.flatMap(({ name }) => TURNING.test(name) ? broken(pair(name)) : pair(name))] as uPlot.AlignedData;
   }, [series, panel]);
 
   useEffect(() => {
