@@ -57,8 +57,8 @@ function written(sliders: Slider[], values: Record<string, unknown>, of: (slider
   return set;
 }
 
-export function CrashPreview({ toml, values, was, ready, onKeep }: {
-  toml: string; values: Record<string, unknown>; was: Record<string, unknown>; ready: boolean; onKeep: (set: Record<string, unknown>) => void;
+export function CrashPreview({ toml, values, was, ready, wrong, onKeep }: {
+  toml: string; values: Record<string, unknown>; was: Record<string, unknown>; ready: boolean; wrong: boolean; onKeep: (set: Record<string, unknown>) => void;
 }) {
   const [moved, setMoved] = useState<Record<string, number>>({});
   const [unit, setUnit] = useState(0);
@@ -93,6 +93,7 @@ export function CrashPreview({ toml, values, was, ready, onKeep }: {
     {!ready && !quick && <Empty>As soon as nothing is open: delta-V, direction of force and path, while you move what is uncertain.</Empty>}
     {ready && !quick && !problem && <Busy>Computing delta-V, direction of force and path…</Busy>}
     <Trouble problem={problem} />
+    {wrong && quick && <p class="notice warn" role="status">This is of the case before: what is written now cannot be computed until it is corrected or answered.</p>}
     {quick && <div class="crash">
       <div>
         <dl class="keys" aria-live="polite">
@@ -105,7 +106,7 @@ export function CrashPreview({ toml, values, was, ready, onKeep }: {
       <PathView quick={quick} before={before} />
       <div class="sliders">
         <h3>What if…</h3>
-        <p class="follows" aria-hidden="true"><b>{quick.delta_v?.shown ?? "no impact"}</b>{quick.pdof && <span>force from {quick.pdof.clock} o'clock, {number(quick.pdof.deg, 3)}°</span>}</p>
+        <p class="follows" aria-hidden="true"><b>{wrong && "before: "}{quick.delta_v?.shown ?? "no impact"}</b>{quick.pdof && <span>force from {quick.pdof.clock} o'clock, {number(quick.pdof.deg, 3)}°</span>}</p>
         {sliders.map((p) => <label key={p.id}>{p.label}
           <input type="range" min={stepped(p, -stepsOf(p))} max={stepped(p, stepsOf(p))} step={p.step} value={moved[p.id] ?? p.value} aria-valuetext={`${number(moved[p.id] ?? p.value)} ${p.unit}`}
             onInput={(e) => setMoved({ ...moved, [p.id]: stepped(p, Math.round((e.currentTarget.valueAsNumber - p.origin) / p.step)) })} />

@@ -36,6 +36,9 @@ export function duration(seconds: number): string {
   return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
+/** The stamp that is shown as zero: of a clock of dates the first, of any other its own zero. */
+export const zeroOf = (first: number) => Number.isFinite(first) && first >= 1e8 ? first : 0;
+
 /** A stamp of the log: as many decimals as the view needs. */
 export function stamp(seconds: number, view: number): string {
   const decimals = Math.min(6, Math.max(0, Math.ceil(2.5 - Math.log10(Math.max(view, 1e-6)))));

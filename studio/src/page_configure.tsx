@@ -240,7 +240,7 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
       </section>
     </div>
     <Positions values={values} onSet={set} />
-    {kind === "crash" && <CrashPreview toml={work.toml} values={values} was={checked?.was ?? NOTHING} ready={!checking && errors.length === 0 && questions.length === 0} onKeep={set} />}
+    {kind === "crash" && <CrashPreview toml={work.toml} values={values} was={checked?.was ?? NOTHING} ready={!checking && errors.length === 0 && questions.length === 0} wrong={errors.length + questions.length > 0} onKeep={set} />}
     {flags.some((flag) => flag in FLAGS) && <fieldset class="row flags"><legend>Options</legend>
       {flags.filter((flag) => flag in FLAGS).map((flag) => <label class="inline" key={flag}><input type="checkbox" checked={flag === SMOOTH ? values["smoother.kind"] === "rts" : work.options.includes(flag)}
         onChange={(e) => flag === SMOOTH ? set({ "smoother.kind": e.currentTarget.checked ? "rts" : "none" }) : setWork({ options: e.currentTarget.checked ? [...work.options, flag] : work.options.filter((o) => o !== flag) })} />{FLAGS[flag]}</label>)}
@@ -274,7 +274,7 @@ function openQuestions(checked: Checked | null, asked: Question[]): Question[] {
     const text = said?.text ?? fault?.text ?? key;
     return {
       code: OPEN, choices: [], free: "number", unit: null, ...said, key, text: typeof name === "string" && name && !text.includes(name) ? `${name}: ${text}` : text,
-      line: fault?.line ?? undefined, remedy: [said && fault?.text ? sentence(fault.text) : "", PLACE.test(key) ? "Or drag its dot on the drawing of the vehicle below." : ""].filter(Boolean).join(" ") || null,
+      line: fault?.line ?? undefined, remedy: [said && fault?.text ? sentence(fault.text) : "", PLACE.test(key) ? "Or drag its dot, an empty circle until then, on the drawing of the vehicle below." : ""].filter(Boolean).join(" ") || null,
     };
   });
 }

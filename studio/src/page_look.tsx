@@ -2,7 +2,7 @@
 
 import { useEffect, useId, useMemo, useState } from "preact/hooks";
 import { api, type Reading } from "./api";
-import { capital, duration, number, plural, stamp } from "./format";
+import { capital, duration, number, plural, stamp, zeroOf } from "./format";
 import { Plan, type Line } from "./plan";
 import { setWork, useShared, type Point, type Work } from "./store";
 import { Traces, TrimBar, type Panel } from "./traces";
@@ -107,14 +107,8 @@ const spanOf = (streams: Stream[]): Span => streams.length ? [Math.min(...stream
 
 const rateOf = (look: Look, s: Stream) => s.rate_hz ?? look.logs.find((log) => log.name === s.file)?.streams.find((one) => one.name === s.name)?.rate_hz ?? null;
 
-/** Stamps from which a clock is one of dates or of the GPS week, s: times are shown from the beginning of the record. */
-const OF_DATES = 1e5;
-
-/** The stamp that is shown as zero: of a clock of dates the first, else its own zero. */
-function zeroOf(look: Look): number {
-  const first = Math.min(...look.streams.map((s) => s.from_s));
-  return Number.isFinite(first) && first >= OF_DATES ? first : 0;
-}
+/** The stamp that is shown as zero. */
+const zeroOfAll = (look: Look) => zeroOf(Math.min(...look.streams.map((s) => s.from_s)));
 
 /** When the record begins, and from when times are shown; empty where there is nothing to say. */
 function saidOfZero(look: Look, zero: number): string {
@@ -189,7 +183,7 @@ function ReadAs({ log }: { log: LogFound }) {
 }
 
 function Contents({ look }: { look: Look }) {
-  const zero = zeroOf(look);
+  const zero = zeroOfAll(look);
   return <>
     {!look.streams.length && <Empty>{look.questions.some((q) => !q.optional) ? "Nothing can be shown before the question above is answered." : "No samples and no fixes were found."}</Empty>}
     {look.streams.length > 0 && <Table stack head={["Stream", "File", "Samples", "Rate", "From", "To", "Gaps"]} numeric={[2, 3, 4, 5, 6]}
@@ -274,7 +268,7 @@ function together(streams: Stream[]): Stream[] {
 const drawnWithCrash = (s: Stream) => ofCrash(s) || s.name === "imu";
 
 function Signals({ look, streams, imu, reading }: { look: Look; streams: Stream[]; imu: Stream; reading: Reading }) {
-  const zero = zeroOf(look);
+  const zero = zeroOfAll(look);
   const { work } = useShared();
   const crash = useMemo(() => together(streams), [streams]);
   const [name, setName] = useState(crash.length ? ALL : keyOf(imu));

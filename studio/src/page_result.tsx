@@ -4,7 +4,7 @@
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { api, part } from "./api";
 import { Attitude, fromEuler } from "./attitude";
-import { bytes, capital, date, plural, stamp } from "./format";
+import { bytes, capital, date, number, plural, stamp, zeroOf } from "./format";
 import { indexOf, METERS_PER_DEG, Plan } from "./plan";
 import { REFERENCE, Traces, type Panel } from "./traces";
 import type { Finding, KeyNumber, RunDetail, Series as SeriesData, Span, Track } from "./types";
@@ -158,6 +158,14 @@ export function panelsOfRun(series: SeriesData, overGround = true): Panel[] {
 /** The middle of a bucket; where an angle goes over its end within it, one of the two. */
 const middle = (low: number, high: number, angle: boolean) => angle && high - low > 180 ? low : (low + high) / 2;
 
+const ANGLES = ["Roll", "Pitch", "Heading"];
+
+/** Half the width of an interval of 95 %, in standard deviations. */
+const TWO_SIDED_95 = 1.959964;
+
+/** That the attitude of a crash is no measurement. */
+const ASSUMED = "sensors.roll-assumed";
+
 /** The motion of a result without positions on the Earth, such as that of a crash, by its series. */
 async function trackOfSeries(name: string, signal: AbortSignal): Promise<Track | null> {
   const there = Object.keys((await api.runSeries(name, { columns: [], width: 1 }, signal)).columns);
@@ -165,13 +173,16 @@ async function trackOfSeries(name: string, signal: AbortSignal): Promise<Track |
   // Of several algorithms the exact one that all peers have; else the last: they go from simple to good.
   const by = algorithms.includes("quaternion") ? "quaternion" : algorithms[algorithms.length - 1];
   const wanted = ["north_m", "east_m", ...["roll_deg", "pitch_deg", "heading_deg"].map((angle) => by ? `${by} ${angle}` : angle)];
-  const { t, columns } = await api.runSeries(name, { columns: wanted.filter((one) => there.includes(one)), width: 2000 }, signal);
+  const bounds = ANGLES.map((angle) => `${angle.toLowerCase()}_sd_deg`);
+  const { t, columns } = await api.runSeries(name, { columns: [...wanted, ...by ? [] : bounds].filter((one) => there.includes(one)), width: 2000 }, signal);
   if (t.length < 2) return null;
   const [north, east, roll, pitch, heading] = wanted.map((one) => columns[one]?.low.map((low, i) => middle(Number(low), Number(columns[one]!.high[i]), one.endsWith("_deg"))));
+  const sd = bounds.map((one) => columns[one]?.high);
   // On a grid a meter is a meter: degrees about the equator stand for it.
   const flat = (meters: number[] | undefined) => meters ? meters.map((m) => m / METERS_PER_DEG) : t.map(() => NaN);
   return {
     t, lat: flat(north), lon: flat(east), alt: [], fixes: null, reference: null, by,
+    sd: sd.every((one) => one) ? t.map((_, i) => sd.map((one) => Number(one![i])) as [number, number, number]) : null,
     q: roll && pitch && heading ? t.map((_, i) => fromEuler(roll[i]!, pitch[i]!, heading[i]!)) : null,
   };
 }
@@ -180,7 +191,7 @@ function Motion({ run, track, cursor, onCursor }: { run: RunDetail; track: Track
   const [playing, setPlaying] = useState(false);
   const last = track.t[track.t.length - 1] ?? 0;
   const whole = useMemo<Span>(() => [run.from_s ?? track.t[0] ?? 0, run.to_s ?? last], [run, track]);
-  const at = cursor ?? whole[0];
+  const at = cursor ?? whole[0], zero = zeroOf(whole[0]);
   useEffect(() => {
     if (!playing) return;
     // The whole record in half a minute, or in its own time if it is shorter.
@@ -198,16 +209,20 @@ function Motion({ run, track, cursor, onCursor }: { run: RunDetail; track: Track
   }, [playing]);
   const i = track.t.length ? indexOf(track.t, at) : -1;
   const q = i >= 0 ? track.q?.[i] ?? null : null;
+  const sd = i >= 0 ? track.sd?.[i] : null;
+  const bounds = sd ? ANGLES.map((name, k) => ({ name, bound: `± ${number(TWO_SIDED_95 * sd[k]!, 2)}°` })) : [];
+  const assumed = run.findings.some((one) => one.code === ASSUMED);
   const hasPlace = track.lat.some(Number.isFinite);
   return <Part title="The motion">
     <div class="row scrub">
       <button type="button" onClick={() => setPlaying(!playing)}>{playing ? "Pause" : "Play"}</button>
-      <input type="range" class="wide" aria-label="Instant" min={whole[0]} max={whole[1]} step={(whole[1] - whole[0]) / 1000 || 1} value={at} aria-valuetext={`${stamp(at, 10)} s`} onInput={(e) => { setPlaying(false); onCursor(e.currentTarget.valueAsNumber); }} />
-      <output>{stamp(at, 10)} s</output>
+      <input type="range" class="wide" aria-label="Instant" min={whole[0]} max={whole[1]} step={(whole[1] - whole[0]) / 1000 || 1} value={at} aria-valuetext={`${stamp(at - zero, 10)} s`} onInput={(e) => { setPlaying(false); onCursor(e.currentTarget.valueAsNumber); }} />
+      <output>{stamp(at - zero, 10)} s</output>
     </div>
+    {zero > 0 && <p class="soft">Times are from the beginning, which is {stamp(zero, 1)} s in the file.</p>}
     <div class="motion">
       {hasPlace && <Plan track={track} onMap={Boolean(run.has.track)} {...(run.over_ground === false ? { up: "forward at the entry" } : {})} fixes={track.fixes} reference={track.reference} cursor={at} onCursor={onCursor} />}
-      {track.q && <Attitude q={q} north={run.over_ground === false ? "entry" : run.begins === "zero" || run.begins === "level" ? "start" : "true"} given={run.begins === "zero" ? "from a beginning that was taken as zero: " : ""} at={`${track.by ? `By ${track.by}, ` : ""}${stamp(at, 10)} s:`} />}
+      {track.q && <Attitude q={q} north={run.over_ground === false ? "entry" : run.begins === "zero" || run.begins === "level" ? "start" : "true"} bounds={bounds} given={run.begins === "zero" ? "from a beginning that was taken as zero: " : assumed ? "by assumption, as not all rates of turn are measured: " : ""} at={`${track.by ? `By ${track.by}, ` : ""}${stamp(at - zero, 10)} s:`} />}
     </div>
     <Series run={run} whole={whole} cursor={cursor} onCursor={onCursor} />
   </Part>;
@@ -226,7 +241,7 @@ function Series({ run, whole, cursor, onCursor }: { run: RunDetail; whole: Span;
     <fieldset class="row pick"><legend>Show</legend>
       {all.map((p) => <label class="inline" key={p.title}><input type="checkbox" checked={chosen.includes(p.title)} onChange={(e) => setPicked(e.currentTarget.checked ? [...chosen, p.title] : chosen.filter((t) => t !== p.title))} />{p.title}</label>)}
     </fieldset>
-    {panels.length > 0 && <Traces panels={panels} whole={whole} askKey={run.name} cursor={cursor} onCursor={onCursor}
+    {panels.length > 0 && <Traces panels={panels} whole={whole} zero={zeroOf(whole[0])} askKey={run.name} cursor={cursor} onCursor={onCursor}
       ask={(columns, view, width, signal) => api.runSeries(run.name, { columns, from: view[0], to: view[1], width }, signal)} />}
   </>;
 }

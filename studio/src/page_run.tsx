@@ -65,6 +65,6 @@ export function JobPage({ id }: { id: string }) {
     <Part title="What it prints">
       {printed.length ? <pre class="tail" tabIndex={0} aria-label="The output">{printed.join("\n")}</pre> : <Empty>Nothing yet.</Empty>}
     </Part>
-    <Part title="The same from a terminal"><Command text={job.command} /></Part>
+    <Part title="The same from a terminal"><Command text={job.again ?? job.command} /></Part>
   </Page>;
 }

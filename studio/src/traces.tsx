@@ -47,6 +47,42 @@ export function axisNumbers(values: number[]): string[] {
   return values.map((v) => Math.abs(v) < step * 1e-6 ? "0" : number(v, 6).replace(/\.?0+(?=e)/, ""));
 }
 
+/** Angles of which one end is the other, 0 and 360. */
+const TURNING = /(^| )heading(_deg)?$/;
+/** Turns beyond which a panel shows each of them apart, deg. */
+const MOST_TURNS = 720;
+
+const turning = (panel: Panel) => panel.columns.length > 0 && panel.columns.every(({ name }) => TURNING.test(name));
+
+/** Steps of the numbers of a heading, deg. */
+const OF_A_TURN = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 45, 90, 180, 360];
+
+type Values = (number | null)[];
+
+/** Headings, greatest and least by column, that go on over north instead of across the panel. */
+function goingOn(pairs: Values[][]): Values[][] {
+  let from: number | null = null;
+  const made = pairs.map(([high, low]) => {
+    let before: number | null = null;
+    const out: Values[] = [[], []];
+    high!.forEach((h, i) => {
+      const l = low![i];
+      if (h === null || l === null || l === undefined) { out.forEach((one) => one.push(null)); return; }
+      // Both sides of north in one: from a little before it to a little after it.
+      const [most, least] = h - l > 180 ? [l, h - 360] : [h, l], middle = (most + least) / 2;
+      const turns: number = 360 * Math.round(((before ?? from ?? middle) - middle) / 360);
+      before = middle + turns;
+      from ??= before;
+      out[0]!.push(most + turns);
+      out[1]!.push(least + turns);
+    });
+    return out;
+  });
+  const all = made.flat(2).filter((v) => v !== null) as number[];
+  const reach = all.reduce<Span>(([low, high], v) => [Math.min(low, v), Math.max(high, v)], [Infinity, -Infinity]);
+  return reach[1] - reach[0] > MOST_TURNS ? pairs : made;
+}
+
 interface Props {
   panels: Panel[]; ask: Ask; whole: Span; askKey: string;
   /** The stamp that is shown as zero, s. */
@@ -192,7 +228,8 @@ function OnePanel(props: Props & {
 
   const data = useMemo(() => {
     const of = (name: string) => series.columns[name];
-    return [series.t, ...panel.columns.flatMap(({ name }) => [of(name)?.high ?? [], of(name)?.low ?? []])] as uPlot.AlignedData;
+    const pairs = panel.columns.map(({ name }) => [of(name)?.high ?? [], of(name)?.low ?? []]);
+    return [series.t, ...(turning(panel) ? goingOn(pairs) : pairs).flat()] as uPlot.AlignedData;
   }, [series, panel]);
 
   useEffect(() => {
@@ -217,7 +254,7 @@ function OnePanel(props: Props & {
       },
       axes: [
         { ...axis, size: 30, space: 90, splits: (_, __, low, high, step) => ticksOf(low, high, step, latest.current.zero ?? 0), values: (_, ticks, __, ___, step) => ticks.map((t) => (t - (latest.current.zero ?? 0)).toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)))) },
-        { ...axis, size: 58, values: (_, values) => axisNumbers(values) },
+        { ...axis, size: 58, ...(turning(panel) ? { incrs: OF_A_TURN } : {}), values: (_, values) => turning(panel) ? values.map((v) => number(((v % 360) + 360) % 360, 6)) : axisNumbers(values) },
       ],
       cursor: {
         drag: { x: true, y: false, setScale: false }, points: { show: false },

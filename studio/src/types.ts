@@ -16,6 +16,8 @@ export interface Problem { code: string; text: string; remedy?: string | null; f
 export interface Job {
   id: string; kind: string; name: string; state: JobState; stage: string | null; share: number | null;
   begun: number | string | null; ended: number | string | null; command: string; run: string | null;
+  /** The command with another folder, where that of the result is there. */
+  again?: string | null;
   error: Problem | null; tail: string[];
   /** All lines of what it prints, where it is asked for alone; `tail` are the last. */
   output?: string[];
@@ -166,6 +168,8 @@ export interface Track {
   q: [number, number, number, number][] | null;
   fixes: { t: number[]; lat: number[]; lon: number[] } | null;
   reference: { t: number[]; lat: number[]; lon: number[] } | null;
+  /** Standard deviations of roll, pitch, heading, deg. */
+  sd?: [number, number, number][] | null;
   /** The algorithm whose attitude it is, where a result has several. */
   by?: string | undefined;
 }

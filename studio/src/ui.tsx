@@ -134,7 +134,7 @@ export function Ask({ question, onAnswer, list, take, of }: { question: Question
   const submit = (event: Event) => {
     event.preventDefault();
     if (!question.key || text.trim() === "") return setFault("Write an answer first.");
-    const value = question.free === "text" ? text : parseNumbers(text);
+    const value = question.free === "text" ? text : list ? parseNumbers(text) : oneNumber(text);
     if (list && question.free !== "text" && (!Array.isArray(value) || value.length !== count)) return setFault(example);
     if (value === null || (Array.isArray(value) && !list)) return setFault("This has to be a number, such as 0.25.");
     void give({ [question.key]: value });
@@ -166,6 +166,13 @@ export function parseNumbers(text: string): number | number[] | null {
   return values.length === 1 ? values[0]! : values;
 }
 
+/** One number, with a decimal comma too; null if it is none, and of 1,000, which may be a thousand. */
+export function oneNumber(text: string): number | null {
+  const written = text.trim();
+  const value = /^[-+]?[1-9]\d{0,2},\d{3}$/.test(written) ? NaN : Number(written.replace(/^([-+]?\d*),(\d+)$/, "$1.$2"));
+  return written !== "" && Number.isFinite(value) ? value : null;
+}
+
 /** A labelled control of a form with its unit, its help and what is wrong with it. */
 export function Control({ field, value, fault, onChange }: {
   field: Field; value: unknown; fault?: string | undefined; onChange: (value: unknown) => void;
@@ -185,7 +192,7 @@ export function Control({ field, value, fault, onChange }: {
     if (text === written) return setText(null);
     if (text.trim() === "") { setOwn(""); return onChange(null); }
     if (field.type === "text") { setOwn(""); return onChange(text); }
-    const numbers = parseNumbers(text);
+    const numbers = field.type === "number" ? oneNumber(text) : parseNumbers(text);
     if (numbers === null && field.type === "number") return setOwn("This has to be a number, such as 0.25.");
     if (field.type === "list") {
       setOwn("");

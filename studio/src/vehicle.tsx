@@ -75,13 +75,15 @@ function View({ title, dots, axes, box, onMove, chosen, onChoose, children }: {
     handle.addEventListener("pointermove", move);
     handle.addEventListener("pointerup", end);
   };
+  // Those that are not stated stand beside the origin, none under another.
+  const unset = (dot: Dot): Point => [0, 0.35 * (1 + dots.filter((one) => one.value === null).indexOf(dot)), 0];
   const keys = (dot: Dot) => (event: KeyboardEvent) => {
     const step = event.shiftKey ? 0.1 : 0.01;
     const by: Record<string, [number, number]> = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, -step], ArrowDown: [0, step] };
     const change = by[event.key];
     if (!change) return;
     event.preventDefault();
-    const from = dot.value ?? [0, 0, 0];
+    const from = dot.value ?? unset(dot);
     put(dot, from[axes[0]]! + change[0], from[axes[1]]! + change[1]);
   };
   return <figure>
@@ -89,7 +91,7 @@ function View({ title, dots, axes, box, onMove, chosen, onChoose, children }: {
       {children}
       <path d="M-0.14 0 H0.14 M0 -0.14 V0.14" class="origin" />
       {[...dots].sort((a, b) => Number(a.key === chosen) - Number(b.key === chosen)).map((dot) => {
-        const at = dot.value ?? [0, 0, 0];
+        const at = dot.value ?? unset(dot);
         return <g key={dot.key} class={`place p${dots.indexOf(dot) + 1}${dot.value === null ? " unset" : ""}`} tabIndex={0} role="button"
           aria-label={`${dot.label}: ${NAMES[axes[0] as 0]} ${number(at[axes[0]]!)} m, ${NAMES[axes[1] as 1]} ${number(at[axes[1]]!)} m. Arrow keys move it.`}
           onPointerDown={drag(dot)} onKeyDown={keys(dot)} onFocus={() => onChoose(dot.key)}>

@@ -101,6 +101,33 @@ await run(async () => {
   await click("Write into the case");
   await page.waitForFunction(() => /angles_deg = \[0(\.0)?, 0(\.0)?, 2(\.0)?\]/.test(document.querySelector("textarea").value));
   await see("in step with the form");
+  // A name that cannot be one is said where it is written, and is the only fault; a good one clears it.
+  const name = page.getByRole("textbox", { name: "Name of the result" }), own = await name.inputValue();
+  await name.fill("../x");
+  await page.locator("#reason.fault").getByText(/'\.\.\/x' cannot be a name here/).waitFor();
+  await see("in step with the form");
+  await name.fill(own);
+  await page.locator("#reason.fault").waitFor({ state: "detached" });
+  // What is wrong leaves the preview as it was, which says so.
+  const whole = await text.inputValue();
+  await text.fill(whole.replace(/^mass_kg = .*$/m, "mass_kg = -5"));
+  await see(/^This is of the case before/);
+  await text.fill(whole);
+  await page.getByText(/^This is of the case before/).waitFor({ state: "detached" });
+  // A decimal comma is one; what may be a thousand is asked again.
+  await page.getByRole("searchbox", { name: "Find a setting" }).fill("mass_kg");
+  const mass = page.locator(".formside").getByRole("textbox", { name: "Mass", exact: true });
+  await mass.fill("1450,5");
+  await mass.press("Enter");
+  await page.waitForFunction(() => /^mass_kg = 1450\.5/m.test(document.querySelector("textarea").value));
+  await mass.fill("1,450");
+  await mass.press("Enter");
+  await see(/^This has to be a number/);
+  await mass.fill("1450,5");
+  await mass.press("Enter");
+  await text.fill(whole);
+  await see("in step with the form");
+  await page.waitForTimeout(800);
   await click("Run it");
   await page.getByRole("link", { name: "See the result" }).waitFor({ timeout: 600_000 });
   await page.getByRole("link", { name: "See the result" }).click();
@@ -108,7 +135,7 @@ await run(async () => {
   await see("The motion");
   await page.getByText("Path, along the vehicle at the entry").first().waitFor();
   await page.getByRole("img", { name: /^Plan of the track, up is forward/ }).waitFor();
-  await see(/since the entry/);
+  await see(/the entry \(± [\d.]+°\), nose .* \(± [\d.]+°\), .* \(± [\d.]+°\)\./);
   await look("crash-4-result");
   done("crash");
 });

@@ -95,6 +95,9 @@ def test_an_attitude_is_that_of_the_command(fresh, tmp_path):
     assert values["columns"]["quaternion heading_deg"]["unit"] == "deg"
     again = {"kind": "attitude", "name": "turns 1", "toml": text, "options": []}
     assert fresh.ask("POST", "api/jobs", again).code == "studio.run-exists"
+    # The command of the run is told so that it can be typed: where its result is, with another one.
+    (job,) = fresh.ask("GET", "api/state").json["jobs"]
+    by_command_line(fresh.folder, job["again"])
 
 
 def test_the_reference_of_an_attitude_is_drawn_beside_its_algorithms(fresh):

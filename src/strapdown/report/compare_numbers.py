@@ -484,11 +484,16 @@ def _crash(part: RunPart) -> Iterator[Value]:
         yield from _row(key, "Severity", label, value, "%", **more, note=note)
     indices = _tables(data, "indices")
     several = Counter((_word(one, "index"), _word(one, "of")) for one in indices)
+    alike = Counter(tuple(_word(one, k) for k in ("index", "of", "standard")) for one in indices)
     for one in indices:
         name, unit = _word(one, "index") or "?", _word(one, "unit") or ""
-        # One index by two standards is two numbers.
-        if several[_word(one, "index"), _word(one, "of")] > 1:
-            name = f"{name}, {_word(one, 'standard') or '?'}"
+        # One index by two standards, or by the sensors of two sets of channels, is two numbers.
+        index, of, standard = (_word(one, k) for k in ("index", "of", "standard"))
+        if several[index, of] > alike[index, of, standard]:
+            name = f"{name}, {standard or '?'}"
+        channels = _at(one, "channels")
+        if alike[index, of, standard] > 1 and isinstance(channels, list):
+            name = f"{name}, channels {', '.join(map(str, channels))}"
         label, key = _of_main(one, name, f"indices.{name}", main)
         factor = SPEEDS["mph"] if unit == "mph" else 1.0
         value = _number(one, "value")

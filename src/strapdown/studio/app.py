@@ -29,7 +29,7 @@ from strapdown import __version__
 from strapdown.bundle.atomic_folder import replace_file
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.studio.events import Events, states_of
-from strapdown.studio.folder import Folder, plain_name
+from strapdown.studio.folder import Folder, plain_name, repeating
 from strapdown.studio.guard import SANDBOX
 from strapdown.studio.jobs import Jobs
 from strapdown.studio.live_jobs import live_command, live_info
@@ -370,8 +370,6 @@ async def cancel(studio: Studio, request: Request) -> Response:
 
 async def run(studio: Studio, request: Request) -> Response:
     """Numbers, findings and inputs of a result."""
-    from strapdown.studio.runs import repeating
-
     name = run_name(studio, request)
     found = await studio.ask("run", studio.folder.path / name, name=name)
     made = next((j for j in studio.jobs.listed() if j["run"] == name), None)

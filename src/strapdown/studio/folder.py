@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
 import tempfile
 import unicodedata
@@ -22,7 +23,7 @@ from typing import Any
 from strapdown.bundle import MANIFEST
 from strapdown.errors import ConfigError, DataError, printable
 
-__all__ = ["STATE", "Folder", "Limits", "is_recording", "plain_name"]
+__all__ = ["STATE", "Folder", "Limits", "is_recording", "plain_name", "repeating"]
 
 #: Folder of the studio's own: jobs and what was computed of logs.
 STATE = ".strapdown-studio"
@@ -102,6 +103,16 @@ def is_recording(path: Path) -> bool:
     with suppress(OSError), path.open("rb") as stream:
         return _OF_RESULT.search(stream.read(_HEAD)) is None
     return True
+
+
+def repeating(folder: Path, name: str, made: str) -> str:
+    """Return the command that made a result with a folder that is not there as ``--out``."""
+    words = [word for word in shlex.split(made) if word != "--force"]
+    again, number = f"{name}-again", 2
+    while (folder / again).exists():
+        again, number = f"{name}-again-{number}", number + 1
+    words[words.index("--out") + 1] = again
+    return shlex.join(words)
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from strapdown.bundle import MANIFEST
 from strapdown.bundle.atomic_folder import replace_file
 from strapdown.errors import ConfigError, Finding
 from strapdown.studio import job_keeper
-from strapdown.studio.folder import Folder, plain_name
+from strapdown.studio.folder import Folder, plain_name, repeating
 from strapdown.studio.reading_process import told
 
 __all__ = ["Job", "Jobs", "process_began"]
@@ -192,6 +192,7 @@ class Jobs:
         with self._lock:
             job = self._known(number)
         done = (self.folder.path / job.name / MANIFEST).is_file()
+        made, whole = shlex.join(("strapdown", *job.words)), job.state == "done" and done
         return {
             "id": job.id,
             "kind": job.kind,
@@ -201,8 +202,10 @@ class Jobs:
             "share": job.share,
             "begun": job.begun,
             "ended": job.ended,
-            "command": shlex.join(("strapdown", *job.words)),
-            "run": job.name if job.state == "done" and done else None,
+            "command": made,
+            # Where the result is, the command that made it is refused.
+            "again": repeating(self.folder.path, job.name, made) if whole else None,
+            "run": job.name if whole else None,
             "error": job.error,
             "tail": self._tail(job),
             "live": self._live(job),

@@ -36,7 +36,7 @@ from strapdown.bundle import (
 )
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.navigation.heading_integrity import STATUSES
-from strapdown.studio.folder import Folder
+from strapdown.studio.folder import Folder, repeating
 from strapdown.studio.kinds import KINDS
 from strapdown.studio.look import kept_stream
 from strapdown.studio.pyramid import LIST, Array
@@ -399,16 +399,6 @@ def _repeating(folder: Path, manifest: Mapping[str, Any], name: str) -> str | No
         return None
     made = shlex.join(("strapdown", command, f"{name}/{file}", "--out", name))
     return repeating(folder, name, made)
-
-
-def repeating(folder: Path, name: str, made: str) -> str:
-    """Return the command that made a result with a folder that is not there as ``--out``."""
-    words = [word for word in shlex.split(made) if word != "--force"]
-    again, number = f"{name}-again", 2
-    while (folder / again).exists():
-        again, number = f"{name}-again-{number}", number + 1
-    words[words.index("--out") + 1] = again
-    return shlex.join(words)
 
 
 # --- series and track ---------------------------------------------------------------------

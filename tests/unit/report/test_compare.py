@@ -775,3 +775,29 @@ def test_paths_in_a_repeated_comparison_are_its_own(tmp_path):
     path.write_text(json.dumps(manifest))
     with pytest.raises(DataError, check=coded("report.configuration-not-understood")):
         sd.verify(tmp_path / "out")
+
+
+def test_an_index_by_two_standards_or_two_sets_of_sensors_is_two_numbers(tmp_path):
+    def index(name, of, standard, *channels):
+        return {"index": name, "of": of, "standard": standard, "value": 1.0, "unit": ""} | {
+            "channels": list(channels)
+        }
+
+    found = [index("ASI", "car", "A"), index("ASI", "car", "B"), index("OLC", "car", "C")]
+    found += [index("HIC15", "driver", "D", "1", "2"), index("HIC15", "driver", "D", "4", "5")]
+    found += [index("HIC15", "passenger", "D", "7"), index("HIC15", "driver", "E", "9")]
+    case = {"case": {"units": []}}
+    for name in "ab":
+        sealed(tmp_path / name, "crash", case, files={"crash.json": {"indices": found}})
+    numbers = sd.compare_runs(tmp_path / "a", tmp_path / "b").numbers
+    labels = [one.any.label for one in numbers if one.any.group == "Severity"]
+    assert labels == [
+        "ASI, A, car",
+        "ASI, B, car",
+        "OLC, car",
+        "HIC15, D, channels 1, 2, driver",
+        "HIC15, D, channels 4, 5, driver",
+        "HIC15, passenger",
+        "HIC15, E, driver",
+    ]
+    assert len({one.key for one in numbers}) == len(numbers)
