@@ -310,7 +310,7 @@ MOST_LINES = 8
 def print_comparison(bench: AttitudeComparison, *, verbose: bool = False) -> None:
     """Print the input of the run, its tables, and the answer last, where it is visible.
 
-    `verbose`: also how the log was read, and the tables that the answer does not rest on.
+    `verbose`: also the tables that the answer does not rest on.
     """
     from strapdown.cli.console import console, print_table
     from strapdown.errors import printable
