@@ -76,7 +76,7 @@ function answer(text, example) {
   if (/\bspeed\b|how fast/i.test(text)) return "50";
   if (/^heading/i.test(text)) return "0";
   if (/title|called/i.test(text)) return "A frontal impact";
-  if (/\bweigh|\bmass\b/i.test(text)) return "1500";
+  if (/\bweigh|\bmass\b(?! may| along)/i.test(text)) return "1500";
   if (/why/i.test(text)) return "centric impact, no turn in the film";
   return example ?? "2";
 }
