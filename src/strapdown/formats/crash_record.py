@@ -208,10 +208,9 @@ def refuse_impossible(channel: CrashChannel, values: NDArray[Any]) -> None:
 
     DataError: names row and channel.
     """
-    limit = IMPOSSIBLE_NUMBER
-    if channel.unit:
-        limits = {"acceleration": IMPOSSIBLE_FORCE, "rate": IMPOSSIBLE_RATE}
-        limit = limits.get(channel.quantity, limit)
+    limits = {"acceleration": (IMPOSSIBLE_FORCE, " m/s²"), "rate": (IMPOSSIBLE_RATE, " rad/s")}
+    of_any_unit = (IMPOSSIBLE_NUMBER, "")
+    limit, unit = limits.get(channel.quantity, of_any_unit) if channel.unit else of_any_unit
     beyond = np.flatnonzero(np.abs(values) > limit)
     if beyond.size:
         raise DataError(
@@ -220,9 +219,7 @@ def refuse_impossible(channel: CrashChannel, values: NDArray[Any]) -> None:
             row=channel.row(int(beyond[0])),
             quantity=f"channel {channel.name}",
             value=float(values[beyond[0]]),
-            unit={"acceleration": " m/s²", "rate": " rad/s"}.get(
-                channel.quantity if channel.unit else "", ""
-            ),
+            unit=unit,
             count=int(beyond.size),
         )
 

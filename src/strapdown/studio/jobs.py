@@ -219,7 +219,7 @@ class Jobs:
 
     def output(self, number: str) -> Path:
         """File of the output of a job."""
-        return self._place / f"{self._known(number).id}.log"
+        return self._file(self._known(number), "log")
 
     # --- one job -------------------------------------------------------------------------
 
