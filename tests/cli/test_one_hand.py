@@ -7,12 +7,13 @@ import re
 from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.main import get_command
 
 from strapdown.cli.main import COMMANDS as SENTENCES
 from strapdown.cli.main import app
-from strapdown.cli.result_folder import default_folder
+from strapdown.cli.result_folder import default_folder, folder_to_write
 from strapdown.cli.shared_options import LogFlags
 
 LOG_PANEL, OUT_PANEL = "How to read the log", "What to write"
@@ -197,6 +198,28 @@ def test_a_folder_keeps_its_whole_name_and_a_result_of_a_result_has_one_ending(t
         (tmp_path / name).mkdir()
     assert default_folder(tmp_path / "drive.2018", "align") == Path("drive.2018-align")
     assert default_folder(tmp_path / "drive-navigate", "outage") == Path("drive-outage")
+    (tmp_path / "drive-navigate-2").mkdir()
+    assert default_folder(tmp_path / "drive-navigate-2", "outage") == Path("drive-outage")
+
+
+def test_a_second_try_with_an_answer_more_has_a_folder_of_its_own(tmp_path, monkeypatch, run_cli):
+    """The command that `doctor` prints can be typed; the first result is not replaced."""
+    monkeypatch.chdir(tmp_path)
+    stamps = 0.01 * np.arange(500)
+    rows = "".join(f"{t:.2f},{np.sin(t):.5f},0.1,0.2,0.0,0.0,9.8\n" for t in stamps)
+    Path("log.csv").write_text("time_s,gx,gy,gz,ax,ay,az\n" + rows)
+    folders = ["log-doctor", "log-doctor-2", "log-doctor-3"]
+    for folder, unit in zip(folders, ("rad/s", "deg/s", "deg/s"), strict=True):
+        done = run_cli("doctor", "log.csv", "--gyro-unit", unit, "--no-report")
+        assert done.code == 0 and f"/{folder}\n" in done.out
+    assert [Path(f).is_dir() for f in folders] == [True] * 3
+    before = Path("log-doctor/doctor.json").read_bytes()
+    done = run_cli("doctor", "log.csv", "--gyro-unit", "deg/s", "--no-report", "--force")
+    assert done.code == 0 and Path("log-doctor/doctor.json").read_bytes() != before
+    # A folder that is asked for is that folder, and an empty one is free.
+    assert folder_to_write(Path("log-doctor"), "log.csv", "doctor", False) == Path("log-doctor")
+    Path("x-align").mkdir()
+    assert folder_to_write(None, "x.csv", "align", False) == Path("x-align")
 
 
 @pytest.fixture(scope="module")

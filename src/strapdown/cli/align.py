@@ -115,7 +115,7 @@ def align(
     """
     from strapdown.cli.console import WORDS, print_findings, print_seal
     from strapdown.cli.result_folder import (
-        default_folder,
+        folder_to_write,
         refuse_result,
         run_and_save,
         source_name,
@@ -142,7 +142,9 @@ def align(
         spec = spec_of_flags(source, given) if asked is None else asked
         return run_alignment(spec, source if own else None, report)
 
-    folder = out or default_folder(source, "align", None if asked is None else source_name(asked))
+    folder = folder_to_write(
+        out, source, "align", write.force, None if asked is None else source_name(asked)
+    )
     done = run_and_save(compute, folder, write, "align.json")
     if done is not None:
         result, seal = done

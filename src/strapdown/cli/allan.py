@@ -73,7 +73,7 @@ def allan(
     """
     from strapdown.api.allan import allan as analyse
     from strapdown.cli.console import print_findings, print_seal
-    from strapdown.cli.result_folder import default_folder, refuse_result, run_and_save
+    from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
 
     for log in logs:
         refuse_result(log, "log")
@@ -91,7 +91,9 @@ def allan(
         runs.append(run)
         return run
 
-    done = run_and_save(compute, out or default_folder(logs[0], "allan"), write, "allan.json")
+    done = run_and_save(
+        compute, folder_to_write(out, logs[0], "allan", write.force), write, "allan.json"
+    )
     if sensor_file is not None:
         from strapdown.bundle.atomic_folder import replace_file
 

@@ -205,7 +205,7 @@ def attitude(
     from strapdown.attitude_comparison.comparison import run_comparison
     from strapdown.bundle import to_json, write_timing
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
-    from strapdown.cli.result_folder import claim, default_folder, refuse_result
+    from strapdown.cli.result_folder import claim, folder_to_write, refuse_result
     from strapdown.errors import ConfigError
     from strapdown.report.attitude import attitude_json
 
@@ -217,7 +217,7 @@ def attitude(
         typst_library()  # before the run
     for source in sources:
         refuse_result(source, "log")
-    folder = out or default_folder(sources[0], "attitude")
+    folder = folder_to_write(out, sources[0], "attitude", write.force)
     claim(folder, write.force)
     if files.export is not None:
         from strapdown.report import attitude_export as export

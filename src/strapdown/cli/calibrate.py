@@ -111,7 +111,7 @@ def calibrate(
     """
     from strapdown.api.calibrate import calibrate as find
     from strapdown.cli.console import print_findings, print_seal
-    from strapdown.cli.result_folder import default_folder, refuse_result, run_and_save
+    from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
 
     for log in logs:
         key, _, value = log.name.partition("=")
@@ -153,7 +153,7 @@ def calibrate(
         return run
 
     done = run_and_save(
-        compute, out or default_folder(logs[0], "calibrate"), write, "calibrate.json"
+        compute, folder_to_write(out, logs[0], "calibrate", write.force), write, "calibrate.json"
     )
     if calibration_file is not None:
         from strapdown.bundle.atomic_folder import replace_file

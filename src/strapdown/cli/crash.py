@@ -112,13 +112,13 @@ def crash(
         print_seal,
         progress,
     )
-    from strapdown.cli.result_folder import claim, default_folder, refuse_result
+    from strapdown.cli.result_folder import claim, folder_to_write, refuse_result
     from strapdown.errors import printable
     from strapdown.report.values import shown_in
 
     for case in cases:
         refuse_result(case, "case")
-    folder = out or default_folder(cases[0], "crash")
+    folder = folder_to_write(out, cases[0], "crash", write.force)
     several = len(cases) > 1
     for k in range(len(cases)):
         claim(folder / str(k + 1) if several else folder, write.force)

@@ -63,7 +63,7 @@ def doctor(
     """
     from strapdown.api.doctor import doctor as examine
     from strapdown.cli.console import console, print_findings, print_seal
-    from strapdown.cli.result_folder import default_folder, refuse_result, run_and_save
+    from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
     from strapdown.systems.clean_log import axes_of_clean_log, write_clean_log
 
     for log in logs:
@@ -80,7 +80,9 @@ def doctor(
             raise as_flag(error, lambda key: LOG_FLAGS.get(f"log, {key}", key)) from None
         return found[0]
 
-    done = run_and_save(compute, out or default_folder(logs[0], "doctor"), write, "doctor.json")
+    done = run_and_save(
+        compute, folder_to_write(out, logs[0], "doctor", write.force), write, "doctor.json"
+    )
     if done is not None:
         result, seal = done
         paths = {one.name: log.path for log, one in zip(result.spec.logs, result.logs, strict=True)}

@@ -86,7 +86,7 @@ def extrinsics(
     from strapdown.api.extrinsics import extrinsics as find
     from strapdown.api.reading import read_gnss
     from strapdown.cli.console import print_findings, print_seal
-    from strapdown.cli.result_folder import default_folder, refuse_result, run_and_save
+    from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
 
     refuse_result(log, "log")
     keys: dict[str, Any] = {k: v for k, v in log_keys(flags.given()).items() if v}
@@ -112,7 +112,7 @@ def extrinsics(
         except ConfigError as error:
             raise as_flag(error, _flag) from None
 
-    folder = out or default_folder(log, "extrinsics")
+    folder = folder_to_write(out, log, "extrinsics", write.force)
     done = run_and_save(compute, folder, write, "extrinsics.json")
     if done is not None:
         result, seal = done

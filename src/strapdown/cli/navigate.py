@@ -157,7 +157,7 @@ def navigate(
     from strapdown.cli.console import WORDS, print_seal
     from strapdown.cli.result_folder import (
         claim,
-        default_folder,
+        folder_to_write,
         refuse_result,
         run_and_save,
         source_name,
@@ -200,7 +200,7 @@ def navigate(
         if asked is not None and path is not None:
             asked = asked.with_path(table, path.absolute())
     named = None if asked is None else source_name(asked)
-    folder = out or default_folder(source, "navigate", named)
+    folder = folder_to_write(out, source, "navigate", write.force, named)
     if live is not None:
         from strapdown.cli.navigate_live import navigate_live
 

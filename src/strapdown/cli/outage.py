@@ -166,7 +166,7 @@ def outage(
     uses the filter's own state, and compares the prediction with the measured drifts.
     """
     from strapdown.cli.console import WORDS, print_findings, print_seal
-    from strapdown.cli.result_folder import default_folder, run_and_save, source_name
+    from strapdown.cli.result_folder import folder_to_write, run_and_save, source_name
     from strapdown.report.outage import read_run_of_outage
     from strapdown.systems.inputs import check_part
     from strapdown.systems.outage_run import run_outage
@@ -184,7 +184,7 @@ def outage(
             WORDS.set("file")
         return run_outage(spec, navigation, file, report)
 
-    folder = out or default_folder(source, "outage", named)
+    folder = folder_to_write(out, source, "outage", write.force, named)
     done = run_and_save(compute, folder, write, "outage.json")
     if done is not None:
         result, seal = done

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,9 +43,30 @@ def default_folder(source: str | Path, ending: str, named: str | None = None) ->
         stem = Path(named).stem
     for word in ENDINGS:
         # The result of a result is named after the first source.
-        if path.is_dir() and stem.endswith(f"-{word}"):
-            stem = stem.removesuffix(f"-{word}")
+        if path.is_dir() and (first := re.fullmatch(rf"(.+)-{word}(-\d+)?", stem)):
+            stem = first[1]
     return Path(stem if stem.lower().endswith(f"-{ending}") else f"{stem}-{ending}")
+
+
+def folder_to_write(
+    out: Path | None, source: str | Path, ending: str, force: bool, named: str | None = None
+) -> Path:
+    """Return the folder that a result goes into: as asked, or the default one.
+
+    A default folder that is there, as after a second try with an answer more, is left as it is: a
+    number is put behind the name. `out`: as the user asked. `force`: replace what is there.
+    `source`, `ending`, `named`: as in `default_folder`.
+    """
+    folder = out or default_folder(source, ending, named)
+    if out is not None or force:
+        return folder
+    others = (folder.with_name(f"{folder.name}-{k}") for k in itertools.count(2))
+    free = (one for one in itertools.chain([folder], others) if not _is_taken(one))
+    return next(free)
+
+
+def _is_taken(folder: Path) -> bool:
+    return folder.is_symlink() or folder.is_file() or (folder.is_dir() and any(folder.iterdir()))
 
 
 def source_name(spec: AlignmentSpec | NavigationSpec) -> str:

@@ -68,12 +68,12 @@ def simulate(
     """Write the log of a scenario, a trajectory or a crash together with its exact truth."""
     from strapdown.api.simulation import simulate as run_simulation
     from strapdown.cli.console import WORDS, console, print_seal, progress
-    from strapdown.cli.result_folder import claim, default_folder
+    from strapdown.cli.result_folder import claim, folder_to_write
 
     own = name.lower().endswith(".toml")
     WORDS.set("file" if own else "cli")
     title = Path(name).stem if own else name
-    folder = out or default_folder(name, "simulated")
+    folder = folder_to_write(out, name, "simulated", write.force)
     claim(folder, write.force)
     with progress(write.quiet or write.json) as report:
         report("simulating", 0.1)

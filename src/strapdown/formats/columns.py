@@ -14,6 +14,7 @@ from strapdown.formats.vocabularies import (
     ABROAD,
     AXIS_WORDS,
     BESIDE,
+    BY_UNIT,
     CHANGE,
     CHIP,
     CLOCKS,
@@ -25,6 +26,7 @@ from strapdown.formats.vocabularies import (
     NO_AXIS,
     NOISE,
     OF_TIME,
+    OTHER_QUANTITY,
     PLACES,
     PX4,
     QUANTITIES,
@@ -39,7 +41,7 @@ from strapdown.formats.vocabularies import (
     WITHOUT_GRAVITY,
     Vocabulary,
 )
-from strapdown.units import FACTORS, GYRO_UNITS, OF_LOGS, find_unit, unit_of, unit_words
+from strapdown.units import ACCEL_UNITS, FACTORS, OF_LOGS, find_unit, unit_of, unit_words
 
 __all__ = [
     "ColumnName",
@@ -65,14 +67,25 @@ _DIRECTIONS = {
     "up": (2, -1.0),
 }
 # Words of a name: split at signs, and where capitals begin or end.
-_HUMPS = re.compile(r"[A-Z]+(?![a-z])\d*|[A-Z]?[^\W\d_A-Z]+\d*|[°µ]+|\d+|²")
+# An axis may precede a rate (gyroXrate), and the word axis another word without a sign between.
+_HUMPS = re.compile(
+    r"[xyzXYZ](?=rate)|[轴軸축]|[A-Z]+(?![a-z])\d*|[A-Z]?[^\W\d_A-Z]+\d*|[°µ]+|\d+|²"
+)
+# Between a script of Asia and a letter, which is an axis.
+_SCRIPTS = re.compile(r"(?<=[\u2e80-\uffef])(?=[a-zA-Z])|(?<=[a-zA-Z])(?=[\u2e80-\uffef])")
 _SIGNS = r"[\s_\-/:,;|.#]+"
 # Text in brackets at the end, which may hold brackets: (m/(s*s)).
 _BRACKETS = re.compile(r"[\[(]\s*((?:[^\[\]()]|\([^()]*\))*?)\s*[\])]\s*$")
+# A unit before the axis: Angular velocity (deg/s) X, of a heading in two rows.
+_UNIT_INSIDE = re.compile(r"(.*?\S)\s*[\[(]([^\[\]()]+)[\])]\W*([xyzXYZ])")
 # Clocks of X-Plane's data output: of the simulated world and of all.
 _XPLANE = ("_totl,_time",)
 # Words and numbers of a heading, whose capitals may begin words.
 _WORD = re.compile(r"[^\W\d_]+|\d+")
+
+
+#: Evidence of a name that has words of which nobody knows what they say of the sensor.
+UNKNOWN_WORDS = 3
 
 
 @dataclass(frozen=True)
@@ -88,7 +101,8 @@ class ColumnName:
         In the spelling of this package; as written where it is none of the vocabulary's.
     loose : int
         Evidence: 0 for a name that is known as it is, 1 behind a word such as ``gps_``, in another
-        order, or with an axis that is only likely, 2 if only some words are known.
+        order, or with an axis that is only likely, 2 if only some words are known, 3
+        (`UNKNOWN_WORDS`) if a sensor and an axis are among words that are not.
     family : str
         Of a sensor: the name without its axis. Columns of one sensor share it. One letter may mean
         anything.
@@ -139,8 +153,13 @@ def _read_name(name: str, of: Vocabulary, unit: str) -> ColumnName:
             return ColumnName(None)  # q[0] is a part of an array, not a column q in units of 0
         text, index = match.groups()
     said = _of_format(text, index) if of.sensors else None
+    inside = _UNIT_INSIDE.fullmatch(text) if of.sensors else None
+    if inside and find_unit(inside[2], of.kinds):
+        text = f"{inside[1]} {inside[3]} ({inside[2]})"
     if said is None:
         bare, bracket = split_brackets(text)
+        if of.sensors and bracket.lower() in tuple(_AXES):
+            bare, bracket = f"{bare} {bracket}", ""  # ACC (X)
         # A recorder may write one heading, with both units, over two columns.
         own = bracket if not of.stems and find_unit(bracket, of.kinds) else ""
         written = own or unit or bracket
@@ -204,14 +223,17 @@ def _read(bare: str, written: str, of: Vocabulary) -> ColumnName:
         parts[-2], unit = _without_unit(parts[-2], of)
     about = any(word in ABOUT for word in re.split(_SIGNS, bare.lower()))
     if not (about and of.sensors):
-        for start in range(len(parts)):
-            said = _read_words(" ".join(parts[start:]), unit, of, about)
+        read = [_read_words(" ".join(parts[k:]), unit, of, about) for k in range(len(parts))]
+        # Words of a group may be unknown where the last part is a name.
+        order = sorted(range(len(parts)), key=lambda k: read[k].loose == UNKNOWN_WORDS)
+        for start in order:
+            said = read[start]
             if said.quantity:
                 family = f"{' '.join(parts[:start]).lower()} {said.family}".strip()
                 said = replace(said, family=family if said.family else "")
                 break
-    if said.quantity is None and of.sensors and said.unit in GYRO_UNITS:
-        said = _turn(bare, said)
+    if said.quantity is None and of.sensors and not of.stems:
+        said = _by_unit(bare, written, said)
     quantity = said.quantity
     kind = find_unit(said.unit) if said.unit else None
     if str(quantity).startswith("mag") and said.unit in MAGNETIC:
@@ -229,12 +251,25 @@ def _read(bare: str, written: str, of: Vocabulary) -> ColumnName:
     return said
 
 
-def _turn(bare: str, said: ColumnName) -> ColumnName:
-    """Read a rotation about an axis as a rate, where its unit is one of rates."""
-    words = re.split(_SIGNS, bare.lower().strip())
-    if len(words) != 2 or words[0] not in ("rotation", "turn") or words[1] not in tuple(_AXES):
+def _by_unit(bare: str, written: str, said: ColumnName) -> ColumnName:
+    """Read a name of which its unit alone says the sensor: ``x-axis (deg/s)``, ``AsX(°/s)``.
+
+    A rate may have words that are not known; an acceleration may be one without gravity, and a
+    field in capitals (mG) is as often one in thousandths of g, so those have an axis alone.
+    """
+    words = _words_of(bare)
+    axes = [w for w in words if w in _AXES]
+    other = [w for w in words if w not in _AXES and w not in NOISE]
+    if len(axes) != 1 and said.unit in ACCEL_UNITS:
+        axes = [a for a, known in DIRECTIONS.items() for w in other if w in known]
+        other = [w for w in other if not any(w in known for known in DIRECTIONS.values())]
+    if len(axes) != 1 or OTHER_QUANTITY & {*other} or TURNS.keys() & {*other}:
         return said
-    return replace(said, quantity=f"gyro_{words[1]}", loose=2, family=words[0])
+    triad = next((t for t, units in BY_UNIT.items() if said.unit in units), "")
+    if not triad or (triad != "gyro" and (other or "G" in written)):
+        return said
+    family = " ".join(other) or str(said.unit)
+    return replace(said, quantity=f"{triad}_{axes[0]}", loose=2, family=family)
 
 
 def _without_unit(text: str, of: Vocabulary) -> tuple[str, str | None]:
@@ -268,7 +303,7 @@ def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> Col
     # Names in capitals without separators (latDeg), in another order (x_gyro), with words that say
     # nothing of the quantity (raw_acceleration_x), or twice the same (gyroRotationRateX).
     text, chip = _without_chip(text) if of.sensors else (text, "")
-    words = [e for w in _HUMPS.findall(text) for e in _english(w.lower())]
+    words = _words_of(text)
     if unit is None:
         words, its = unit_words(words, OF_LOGS if of.stems else of.kinds)
         unit = its or None
@@ -282,6 +317,9 @@ def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> Col
     bare = [part for w in words if not _is_model(w) for part in re.findall(r"\D+|\d+", w)]
     bare = [w for w in bare if w not in NOISE]
     axes = [k for k, w in enumerate(bare) if w in _AXES]
+    force = [k for k in range(len(bare) - 1) if bare[k : k + 2] == ["g", "force"]]
+    for k in force:
+        bare[k : k + 2] = ["gforce"]
     if not axes and any(w in TRIADS["accel"] for w in bare):
         bare = [next((a for a, known in DIRECTIONS.items() if w in known), w) for w in bare]
         axes = [k for k, w in enumerate(bare) if w in _AXES]
@@ -294,6 +332,8 @@ def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> Col
         # A letter behind a place may be anything: foot_f_x.
         if said is None or str(said.quantity)[-2:-1] != "_" or len(said.family) < 2:
             said = None
+    if said is None and not of.stems:
+        said = _among_words(bare)
     if said is None:
         return ColumnName(None, unit)
     if said.family and said.number is None:
@@ -303,7 +343,20 @@ def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> Col
         family = "".join(other) if len(other) < len(words) else said.family
         family = f"of {family}{chip}" if words[:1] == [axis] else f"{family}{chip}"
         said = replace(said, family=f"{family}#" if len(family) < 2 else family)
-    return replace(said, unit=unit or said.unit, loose=2)
+    return replace(said, unit=unit or said.unit, loose=max(said.loose, 2))
+
+
+def _among_words(words: list[str]) -> ColumnName | None:
+    """Read the name of one sensor and one axis among words that are not known, at last."""
+    triads = {t for t, names in TRIADS.items() for w in words if len(w) > 2 and w in names}
+    axes = [w for w in words if w in _AXES]
+    if len(triads) != 1 or len(axes) != 1 or OTHER_QUANTITY & {*words} or TURNS.keys() & {*words}:
+        return None
+    triad, family = triads.pop(), " ".join(w for w in words if w not in _AXES)
+    if triad == "accel" and {"angular", "ang"} & {*words}:
+        return None
+    linear = bool(WITHOUT_GRAVITY & {*words})
+    return ColumnName(f"{triad}_{axes[0]}", loose=UNKNOWN_WORDS, family=family, linear=linear)
 
 
 def _without_chip(text: str) -> tuple[str, str]:
@@ -314,6 +367,11 @@ def _without_chip(text: str) -> tuple[str, str]:
         version = bool(chip) and len(part) == 1 and part.lower() not in tuple(_AXES)
         (chip if version or CHIP.fullmatch(part.lower()) else kept).append(part)
     return (" ".join(kept), "".join(chip).lower()) if kept and chip else (text, "")
+
+
+def _words_of(text: str) -> list[str]:
+    """Return the words of a name, in lower case and in English where they are known."""
+    return [e for w in _HUMPS.findall(_SCRIPTS.sub(" ", text)) for e in _english(w.lower())]
 
 
 def _english(word: str) -> tuple[str, ...]:
@@ -330,7 +388,8 @@ def _english(word: str) -> tuple[str, ...]:
 
 def without_accents(text: str) -> str:
     """Return the letters of a text without their accents."""
-    return "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
+    bare = "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
+    return unicodedata.normalize("NFC", bare)  # the syllables of Korean are whole again
 
 
 def _is_model(word: str) -> bool:

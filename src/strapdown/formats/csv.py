@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats.arrays import is_date, is_day_time, is_stamp
-from strapdown.formats.columns import read_name, split_brackets
+from strapdown.formats.columns import UNKNOWN_WORDS, read_name, split_brackets
 from strapdown.formats.preamble import stated_by_keys, stated_rate, stated_units
 from strapdown.formats.recording import RawLog, stated_by
 from strapdown.formats.serial_text import one_line_a_sample, with_names
@@ -440,7 +440,8 @@ _SHARED = re.compile(r".+[\s_\-/:.]")
 
 
 def _is_gyro(name: str) -> bool:
-    return str(read_name(name).quantity).startswith("gyro_")
+    said = read_name(name)
+    return str(said.quantity).startswith("gyro_") and said.loose != UNKNOWN_WORDS
 
 
 def _first_row(numbered: Lines, kinds: Sequence[str]) -> tuple[int, str | None, int]:

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.formats.arrays import is_stamp, numbers, ticks_of
 from strapdown.formats.clocks import clock_of_name
-from strapdown.formats.columns import INDEXED, ColumnName, clocks_with_unit, read_name
+from strapdown.formats.columns import (
+    INDEXED,
+    UNKNOWN_WORDS,
+    ColumnName,
+    clocks_with_unit,
+    read_name,
+)
 from strapdown.formats.nameless import rates_and_force
 from strapdown.formats.recording import INFERRED, STATED, Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import (
@@ -342,8 +348,12 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
         first = next(iter(kept.values()))
         members = {f"{triad}_{axis}": name for axis, name in first.items()}
         found |= {q: name for q, name in members.items() if q not in wanted}
-        if len(kept) > 1 and not wanted.keys() & members.keys():
+        if wanted.keys() & members.keys():
+            continue
+        if len(kept) > 1:
             _ask_which(raw, triad, list(kept.values()), questions)
+        elif said[next(iter(first.values()))].loose == UNKNOWN_WORDS:
+            _ask_whether(raw, triad, first, questions)
     rest: dict[str, list[str]] = {}
     for name, one in said.items():
         if one.quantity in QUANTITIES and not one.family:
@@ -400,6 +410,7 @@ def _best(families: dict[str, Family], said: dict[str, ColumnName]) -> dict[str,
     # A name that is there twice leaves open which of the two is meant.
     kept = {f: m for f, m in families.items() if f in whole or f.rstrip("'") in whole} or families
     preferences: tuple[Callable[[ColumnName, str], bool], ...] = (
+        lambda one, family: one.loose != UNKNOWN_WORDS,
         lambda one, family: not one.increment,
         lambda one, family: not one.linear,
         lambda one, family: "including" in family,
@@ -469,6 +480,17 @@ def _ask_which(raw: RawLog, triad: str, kept: list[Family], questions: Questions
     names = [m[axis] for m in kept if axis in m]
     answer = _answer(raw, triad, kept[0])
     questions.ask(_several(raw, f"{triad}_{axis}", names, names[0]), **answer)
+
+
+def _ask_whether(raw: RawLog, triad: str, family: Family, questions: Questions) -> None:
+    """Ask whether columns whose names have words that are not known are those of a triad."""
+    names = [family[a] for a in AXES if a in family]
+    answer = _answer(raw, triad, family)
+    columns = [f"{quantity}={name}" for quantity, name in answer.items()]
+    finding = Finding(
+        "io.columns-by-words", file=raw.name, quantity=triad, names=names, columns=columns
+    )
+    questions.ask(finding, **answer)
 
 
 def _answer(raw: RawLog, triad: str, family: Family) -> dict[str, str]:

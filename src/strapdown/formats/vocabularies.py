@@ -13,6 +13,7 @@ from functools import cached_property
 
 from strapdown.units import (
     ANGLES,
+    GYRO_UNITS,
     LENGTHS,
     OF_CRASHES,
     OF_LOGS,
@@ -103,12 +104,15 @@ def _words(text: str) -> tuple[str, ...]:
 ABROAD = {
     english: _words(stems)
     for english, stems in {
-        "time": "zeit uhrzeit temps horodat tiempo tempo vrijeme vreme czas tijd",
-        "acceleration": "beschl aceler accelerazion accelerometr przysp ubrz versnell",
-        "gyroscope": "drehrate drehgeschw winkelgeschw giroscop gyroskop kreisel",
-        "magnetometer": "magnetfeld magnetometr",
-        "velocity": "geschwindigkeit vitesse velocidad velocita",
-        "angular": "angulaire angolar",
+        "time": "zeit uhrzeit temps horodat tiempo tempo vrijeme vreme czas tijd "
+        "время 时间 時間 시간",
+        "acceleration": "beschl aceler accelerazion accelerometr przysp ubrz versnell zrychl "
+        "ускорен акселером 加速度 가속도",
+        "gyroscope": "drehrate drehgeschw winkelgeschw giroscop gyroskop kreisel hoeksnelh "
+        "гироскоп 角速度 陀螺 ジャイロ 각속도 자이로",
+        "magnetometer": "magnetfeld magnetometr магнит 磁 지자기 자기장",
+        "velocity": "geschwindigkeit vitesse velocidad velocita predkosc скорость",
+        "angular": "angulaire angolar katow угловая",
         "linear": "linear lineaire lineal",
         "without": "ohne sans senza",
         "roll": "wank roulis alabeo rollio",
@@ -120,9 +124,19 @@ ABROAD = {
 TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
 #: Words for the axes of a vehicle.
 DIRECTIONS = {
-    "x": ("longitudinal", "longit", "langs", "laengs", "longitudinale", "inline"),
-    "y": ("lateral", "quer", "laterale", "transversal"),
-    "z": ("vertical", "vertikal", "hoch", "verticale"),
+    "x": (
+        "longitudinal",
+        "longit",
+        "long",
+        "lon",
+        "lineal",
+        "langs",
+        "laengs",
+        "longitudinale",
+        "inline",
+    ),
+    "y": ("lateral", "lat", "quer", "laterale", "transversal"),
+    "z": ("vertical", "vert", "vertikal", "hoch", "verticale"),
 }
 TIMES = _words(
     "time t ts timestamp timestamps timesec elapsed secondselapsed seconds sec tow sow gpssow "
@@ -173,9 +187,10 @@ _TRIAD_WORDS = {
     "gyro": "gyro gyros gyr gyroscope gyroscopes imugyr imugyro angularvelocity angularvel angvel "
     "velocityangular rotationvelocity velocityrotation "
     "angularrate angularrates angrate angularspeed turnrate rot rotationrate rotrate omega rate "
-    "av w g ω",
+    "av w g ω avel pqr bodyrate bodyrates wb wib wibb omegab omegaib omegaibb",
     "accel": "accel acce acc accelerometer accelerometers accelerations acceleration accl "
-    "linearacceleration linacc linaccel lina la gforce gf imuacc imuaccel specificforce xl a f",
+    "linearacceleration linacc linaccel lina la gforce gf imuacc imuaccel specificforce "
+    "specforce sf fb fib fibb xl a f",
     "mag": "mag magn magnet magnetic magnetometer magnetometers magneticfield magfield field "
     "imumag compass m b",
 }
@@ -235,7 +250,10 @@ NOISE = {
     *("cal", "calib", "calibrated", "corrected", "meas", "measured", "value", "values", "axis"),
     *("ins", "the", "of", "in", "de", "del", "di", "reading", "readings", "uncal", "uncalibrated"),
     # Of flight controllers: converted, smoothed (gyroADC, accSmooth).
-    *("adc", "smooth"),
+    *("adc", "smooth", "filt", "filtered", "lpf", "lowpass", "out", "scaled", "total", "inertial"),
+    *("uncomp", "uncompensated", "comp", "compensated", "ch", "channel", "sens", "mpu"),
+    # Counts, and revolutions or radians per second: the values say which.
+    *("lsb", "rps", "轴", "軸", "축", "ось", "оси"),
 }
 #: Where a sensor is worn or mounted, and its range: they tell sensors apart, not quantities.
 PLACES = {
@@ -253,6 +271,23 @@ CHIP = re.compile(
 ABOUT = {
     *("bias", "offset", "scale", "cov", "covariance", "std", "stddev", "stdev", "sd", "sigma"),
     *("var", "variance", "error", "err", "accuracy", "setpoint", "desired", "noise"),
+}
+
+#: Words of a quantity that is none of a sensor's axes in the body's frame, though one is named.
+OTHER_QUANTITY = ABOUT | {
+    *_words("temp temperature time angle angles integral count counts flag status valid clip"),
+    *_words("clipping saturated jerk rms norm magnitude threshold psd fft range odr gain world"),
+    *_words("earth global ned enu nav local ref reference true truth ideal pred predicted mean"),
+    *_words("avg min max median energy entropy corr correlation diff delta residual innovation"),
+    *_words("cmd command target limit free dynamic motor wheel sat saturation drift integrated"),
+    *_words("gps gnss dot heading dec"),
+}
+#: Units that say the sensor of a column whose name is an axis. Those of a field in gauss are also
+#: written for accelerations in g.
+BY_UNIT = {
+    "gyro": set(GYRO_UNITS),
+    "accel": {"m/s2", "g", "mg", "ft/s2"},
+    "mag": {"uT", "nT"},
 }
 
 

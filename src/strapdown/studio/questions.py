@@ -108,7 +108,7 @@ def question_of(
 #: Answers that are keys of their own.
 PLAIN = ("repair", "rate")
 #: Questions about which column is meant.
-COLUMNS_OPEN = ("io.columns-ambiguous", "io.letter-g-open")
+COLUMNS_OPEN = ("io.columns-ambiguous", "io.columns-by-words", "io.letter-g-open")
 
 
 def axes_question(finding: Finding, file: str) -> dict[str, Any] | None:

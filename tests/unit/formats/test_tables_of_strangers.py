@@ -1037,3 +1037,77 @@ def test_a_word_before_rows_under_its_own_name_moves_no_name(tmp_path):
     with pytest.raises(DataError) as refused:
         read(tmp_path, lines, gyro_unit="deg/s", accel_unit="g")
     assert "gyro_x" not in dict(refused.value.finding.data.get("answers", ()))
+
+
+def header_of(gyro, accel, axis="x"):
+    """Return a header of a clock and of two names, each with its three axes for the braces."""
+    axes = [chr(ord(axis) + k) for k in range(3)]
+    return ",".join(["Time (s)", *(name.format(a) for name in (gyro, accel) for a in axes)])
+
+
+@pytest.mark.parametrize(
+    ("gyro", "accel"),
+    [
+        ("{} (dps)", "{} (g)"),
+        ("{}-axis (deg/s)", "{}-axis (g)"),
+        ("Angular velocity (deg/s) {}", "Acceleration (g) {}"),
+        ("GYR ({}) [deg/s]", "ACC ({}) [g]"),
+        ("{}_gyro_out", "{}_accl_out"),
+        ("scaledGyro{}", "scaledAccel{}"),
+        ("uncomp_gyro_{}", "uncomp_accel_{}"),
+        ("gyr_filt_{}", "acc_lpf_{}"),
+        ("gyro_{}_filtered", "total_acc_{}"),
+        ("w_ib_b_{}", "f_ib_b_{}"),
+        ("pqr_{}", "sf{}"),
+        ("avel_{}", "spec_force_{}"),
+        ("gyro_{}_rps", "accel_{}_lsb"),
+        ("角速度{}(°/s)", "加速度{}(g)"),
+        ("{}轴角速度(°/s)", "{}轴加速度(g)"),
+        ("각속도 {} (deg/s)", "가속도 {} (g)"),
+        ("Угловая скорость {}", "Ускорение {}"),
+        ("hoeksnelheid {}", "versnelling {}"),
+    ],
+)
+@pytest.mark.parametrize("capital", [False, True])
+def test_sensors_by_names_of_many_programs(tmp_path, gyro, accel, capital):
+    header = header_of(gyro, accel, "X" if capital else "x")
+    check(read(tmp_path, [header, *rows()], gyro_unit="deg/s", accel_unit="g"))
+
+
+def test_a_rate_by_its_unit_and_its_axis(tmp_path):
+    """As the program of WitMotion names it."""
+    header = header_of("As{}(°/s)", "Acc{}(g)", "X")
+    check(read(tmp_path, [f"{header},AngleX(°),AngleY(°)", *(f"{r},1,2" for r in rows())]))
+
+
+def test_an_accelerometer_by_the_axes_of_a_car_in_short(tmp_path):
+    """As MoTeC and others name them; the order of the columns is not that of the axes."""
+    turns = [f"Gyro {turn} Velocity" for turn in ("Roll", "Pitch", "Yaw")]
+    forces = [f"G Force {axis}" for axis in ("Long", "Lat", "Vert")]
+    header = ",".join(["Time", *turns, *forces])
+    check(read(tmp_path, [header, *rows()], gyro_unit="deg/s", accel_unit="g"))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("FreeAcc_X", "gyro_temp_x", "acc_x_std", "acc_world_x", "Earth acceleration X"),
+        *("gyro_x_sat", "acc_mean_x", "gyro_angle_x", "AngularAcceleration_X", "ang_acc_x"),
+        *("angular acceleration x (rad/s2)", "jerk_x (m/s3)", "AngleX(°)", "heading x (deg/s)"),
+        *("setpoint x (deg/s)", "Motor_x (rad/s)", "Wheel Speed X (rad/s)", "velocity x (m/s)"),
+        *("X (mG)", "x (G)", "roll x (deg/s)", "lat accuracy (m)", "gps_acc_x", "x", "foot x (g)"),
+    ],
+)
+def test_a_quantity_beside_an_axis_is_not_taken_for_a_sensor(name):
+    assert read_name(name).quantity is None
+
+
+def test_names_with_words_that_are_not_known_are_asked_about(tmp_path):
+    header = header_of("gyro_zorp_{}", "accel_zorp_{}")
+    asked = answers(tmp_path, [header, *rows()], gyro_unit="deg/s", accel_unit="g")
+    assert asked == {"gyro": "gyro_zorp", "accel": "accel_zorp"}
+    check(read(tmp_path, [header, *rows()], gyro_unit="deg/s", accel_unit="g", columns=asked))
+    # They are a last resort: names that are known come first, and nothing is asked.
+    both = [f"{line},9,9,9" for line in rows()]
+    known = HEADER + ",gyro_zorp_x,gyro_zorp_y,gyro_zorp_z"
+    check(read(tmp_path, [known, *both]))
