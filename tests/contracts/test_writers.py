@@ -263,7 +263,7 @@ def test_fixes_come_back(tmp_path, name, clock):
     if clock == "relative" and name == "gpx":
         said = {f.code for f in WRITERS[name].write(path, tables)}
         assert "io.written-without-dates" in said
-        with pytest.raises(DataError, check=coded("io.gpx-without-time")):
+        with pytest.raises(DataError, check=coded("io.track-without-time")):
             read_gnss(path, GnssOptions())
         return
     WRITERS[name].write(path, tables)

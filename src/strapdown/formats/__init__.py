@@ -234,6 +234,10 @@ READERS: dict[str, Reader] = {
     "gopro": Reader.of(gopro, "GoPro telemetry: GPMF, MP4, JSON"),
     "garmin-fit": Reader.of(tracks, "Garmin FIT (.fit)", name="fit"),
     "gpx": Reader("GPX track (.gpx)", tracks.detect_gpx, {"gnss": tracks.read_gpx}),
+    "kml": Reader("KML track (.kml .kmz)", tracks.detect_kml, {"gnss": tracks.read_kml}),
+    "geojson": Reader(
+        "GeoJSON with times (.geojson .json)", tracks.detect_geojson, {"gnss": tracks.read_geojson}
+    ),
     "dji-srt": Reader(
         "subtitles of a DJI drone (.SRT)", tracks.detect_dji, {"gnss": tracks.read_dji}
     ),

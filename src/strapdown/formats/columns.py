@@ -152,6 +152,8 @@ def _read_name(name: str, of: Vocabulary, unit: str) -> ColumnName:
         if not of.sensors:
             return ColumnName(None)  # q[0] is a part of an array, not a column q in units of 0
         text, index = match.groups()
+    if not of.sensors:
+        text = re.sub(r"[\s_(]+(?:N/S|E/W)\)?$", "", text)  # letters behind the number
     said = _of_format(text, index) if of.sensors else None
     inside = _UNIT_INSIDE.fullmatch(text) if of.sensors else None
     if inside and find_unit(inside[2], of.kinds):

@@ -12,8 +12,9 @@ import codecs
 import itertools
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
@@ -592,6 +593,9 @@ def one_clock_of_parts(
                 one = name.removesuffix(whole)[:-1] or "stamp"
                 out = {one if n == name else n: held if n == name else c for n, c in out.items()}
                 units[one] = "ns"
+    for name, texts in _digits_of_clock(columns).items():
+        columns = {**columns, name: texts}
+        out[name] = texts
     dates = [n for n, c in columns.items() if c.dtype.kind == "O" and is_date(c[0])]
     times = [n for n, c in columns.items() if c.dtype.kind == "O" and is_day_time(c[0])]
     if len(dates) == len(times) == 1 and "date" in dates[0].lower():
@@ -604,6 +608,56 @@ def one_clock_of_parts(
             dtype=object,
         )
     return out
+
+
+def _digits_of_clock(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return a date and a time of day that are numbers of digits, 240506 and 93015.2, as texts.
+
+    Both are required, by their names. A date of which year and day are open (240506 may be of 2024
+    or of 2006) becomes no date, and the time counts from midnight.
+    """
+    named = {
+        word: [n for n, c in columns.items() if c.dtype.kind in "iuf" and _says(n, word)]
+        for word in ("date", "time")
+    }
+    if any(len(names) != 1 for names in named.values()):
+        return {}
+    (date,), (clock,) = named.values()
+    day, of_day = columns[date].astype(np.float64), columns[clock].astype(np.float64)
+    whole = np.floor(of_day)
+    parts = [whole // 10_000, whole // 100 % 100, whole % 100]
+    if not (np.isfinite(day).all() and np.isfinite(of_day).all()) or any(
+        (v < 0).any() or (v >= most).any() for v, most in zip(parts, (24, 60, 60), strict=True)
+    ):
+        return {}
+    orders = {"%Y%m%d": 10**7, "%y%m%d": 0, "%d%m%y": 0}
+    found = []
+    for order, least in orders.items():
+        texts = [f"{int(d):0{8 if least else 6}d}" for d in np.unique(day)]
+        try:
+            read = {float(t): datetime.strptime(t, order) for t in texts}
+        except ValueError:
+            continue
+        if all(2000 <= d.year <= 2045 for d in read.values()):
+            found.append(read)
+    if not found:
+        return {}
+    times = [
+        f"{int(h):02d}:{int(m):02d}:{second:09.6f}"
+        for h, m, second in zip(parts[0], parts[1], of_day - 100.0 * (whole // 100), strict=True)
+    ]
+    out = {clock: np.array(times, dtype=object)}
+    # A text of digits is no clock.
+    sure = len(found) == 1
+    days = [f"{found[0][d]:%Y-%m-%d}" if sure else f"{int(d):06d}" for d in day.tolist()]
+    out[date] = np.array(days, dtype=object)
+    return out
+
+
+def _says(name: str, word: str) -> bool:
+    """Whether a name is a word, alone or with UTC beside it: DATE, utc_time."""
+    said = re.sub(r"[\W_]|utc|gps|gmt", "", name.lower())
+    return said in (word, word * 2) or said in {"date": ("datum", "day"), "time": ("hhmmss",)}[word]
 
 
 # Lines, fields and numbers.

@@ -488,7 +488,12 @@ def _ask_whether(raw: RawLog, triad: str, family: Family, questions: Questions) 
     answer = _answer(raw, triad, family)
     columns = [f"{quantity}={name}" for quantity, name in answer.items()]
     finding = Finding(
-        "io.columns-by-words", file=raw.name, quantity=triad, names=names, columns=columns
+        "io.columns-by-words",
+        file=raw.name,
+        quantity=triad,
+        of_what=triad,
+        names=names,
+        columns=columns,
     )
     questions.ask(finding, **answer)
 

@@ -16,6 +16,7 @@ from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, ch
 from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock
+from strapdown.formats.coordinates import with_degrees
 from strapdown.formats.find_columns import Found, fix_columns, names_of_quantities
 from strapdown.formats.gnss_fixes import (
     NOWHERE,
@@ -57,7 +58,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     two columns fit one quantity, or a unit is unknown.
     """
     found = _in_units(raw, fix_columns(raw, options.columns), options.units)
-    raw = _rows_of_fixes(raw, found)
+    raw = _rows_of_fixes(with_degrees(raw, found), found)
     _refuse_missing(raw, found, stated=options.datum_height is not None)
 
     def values(quantity: str) -> Array:
@@ -319,7 +320,7 @@ def _sd_of_speed(raw: RawLog, found: dict[str, Found], values: Callable[[str], A
 #: Steps between fixes from which a speed is computed, s, and the least distance in them, m.
 _STEPS, _WAY = (0.05, 10.0), 50.0
 #: Units that a speed without one may have, and how near the ratio to that of the positions is.
-_SPEEDS, _NEAR = ("km/h", "kn", "mph"), 0.04
+_SPEEDS, _NEAR = ("km/h", "kn", "mph", "cm/s", "mm/s"), 0.04
 
 
 def _refuse_unit_of_speed(

@@ -83,6 +83,17 @@ def read_core_motion(path: Path) -> RawLog:
     if missing:
         names = ", ".join(raw.columns)
         raise DataError("io.no-column-4", file=path.name, missing=missing, columns=names)
+    return with_force_summed(raw)
+
+
+def with_force_summed(raw: RawLog) -> RawLog:
+    """Return a table of Core Motion with its specific force; any other table as it is.
+
+    DataError: a value is not a number.
+    """
+    named = _named(list(raw.columns))
+    if len(named) < 9:
+        return raw
     gyro, gravity, user = (
         np.column_stack([column(raw, named[f"{v}_{a}"]) for a in "xyz"]) for v in WORDS
     )
@@ -104,7 +115,7 @@ def read_core_motion(path: Path) -> RawLog:
     log.findings.append(
         Finding(
             "io.force-summed",
-            file=path.name,
+            file=raw.name,
             quantity="accel",
             severity="note",
             linear=named["user_x"],

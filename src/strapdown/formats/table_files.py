@@ -20,6 +20,7 @@ from strapdown.formats.android_events import joined, kind_of
 from strapdown.formats.arrays import raw_log
 from strapdown.formats.columns import read_name
 from strapdown.formats.known_formats import from_json, under
+from strapdown.formats.phone_apps import with_force_summed
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 from strapdown.parsers import parse
@@ -56,7 +57,7 @@ def read_excel(path: Path) -> RawLog:
     writer = text_csv.writer(buffer, lineterminator="\n")
     for row in sheets[name]:
         writer.writerow([_text_of_excel(cell) for cell in [*row, *[None] * (width - len(row))]])
-    raw = csv.parse(buffer.getvalue().encode(), path.name, (path,))
+    raw = with_force_summed(csv.parse(buffer.getvalue().encode(), path.name, (path,)))
     if len(sheets) > 1:
         others = [n for n in sheets if n != name]
         raw.findings.append(
@@ -75,7 +76,8 @@ def _text_of_excel(cell: Any) -> str:
     return repr(cell) if isinstance(cell, float) else str(cell)
 
 
-# JSON of samples: lines of one object each, or one list of objects.
+# JSON of samples: lines of one object each, or one list of objects, alone or as the member of an
+# object.
 #
 # Names of members are joined by a dot (``{"gyro": {"x": 0.1}}`` is ``gyro.x``), parts of lists
 # are numbered from 0 (``gyro[0]``); they are then understood as those of any table. Objects of
@@ -92,6 +94,8 @@ DEEP = 6
 #: A list of sensors before the list of their values, as Edge Impulse has them (data acquisition
 #: format): ``"sensors": [{"name": "accX", "units": "m/s2"}, …], "values": [[…], …]``.
 _APART = re.compile(r'"sensors"\s*:\s*\[\s*\{[^\[\]]*\}\s*\]\s*,\s*"values"\s*:\s*\[')
+#: An object of which one member is the list of the objects: ``{"locations": [{…``.
+_MEMBER = re.compile(r'\{\s*(?:"\w+"\s*:\s*(?:"[^"]*"|[-\w.]+)\s*,\s*)*"\w+"\s*:\s*\[\s*\{')
 
 
 def _is_object(line: str) -> bool:
@@ -106,7 +110,7 @@ def _begins(path: Path) -> bool:
     text = head(path).lstrip()
     if path.suffix.lower() in JSON_SUFFIXES[:1] and text.startswith("["):
         return text[1:].lstrip().startswith("{")
-    if _APART.search(text):
+    if _APART.search(text) or _MEMBER.match(text):
         return True
     return _is_object(text.partition("\n")[0])
 
@@ -143,7 +147,8 @@ def read_json(path: Path) -> RawLog:
             columns[name] = np.array(
                 [np.nan if v is None else v for v in values], dtype=None if whole else np.float64
             )
-    return RawLog(path.name, (path,), columns, rows=np.array(rows), findings=findings)
+    raw = RawLog(path.name, (path,), columns, rows=np.array(rows), findings=findings)
+    return with_force_summed(raw)
 
 
 def _names_apart(path: Path) -> RawLog:
@@ -173,8 +178,11 @@ def _names_apart(path: Path) -> RawLog:
 def _objects(path: Path) -> tuple[list[dict[str, Any]], list[int], list[Finding]]:
     """Return the objects, each with its line or its number in the list."""
     text, findings = csv.decoded(path.read_bytes(), path.name)
-    if text.lstrip().startswith("["):
+    inside = _MEMBER.match(text.lstrip()) and "}\n{" not in text
+    if text.lstrip().startswith("[") or inside:
         content = from_json(path)
+        if isinstance(content, dict):
+            content = next((v for v in content.values() if isinstance(v, list)), [])
         if not content or not all(isinstance(o, dict) for o in content):
             raise DataError("io.not-list-records", file=path.name)
         return content, list(range(1, len(content) + 1)), findings
@@ -398,7 +406,7 @@ def read_parquet(path: Path) -> RawLog:
         The file is damaged, or declares far more data than it holds.
     """
     found = parse("parquet.table", path, room=room)
-    return raw_log(path, found["arrays"], found["units"], found["meta"])
+    return with_force_summed(raw_log(path, found["arrays"], found["units"], found["meta"]))
 
 
 def write_parquet(

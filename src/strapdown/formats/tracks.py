@@ -1,22 +1,24 @@
-"""Positions of watches, receivers and drones: Garmin FIT, GPX, subtitles of DJI."""
+"""Positions of watches, receivers and drones: Garmin FIT, GPX, KML, GeoJSON, subtitles of DJI."""
 
 from __future__ import annotations
 
 import re
 from collections import defaultdict
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.join import join
-from strapdown.formats.known_formats import lacking, selected
+from strapdown.formats.known_formats import from_json, lacking, selected
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 from strapdown.formats.writing import (
@@ -59,7 +61,7 @@ def read_gpx(path: Path) -> RawLog:
     times = points["time"]
     timed = np.array([t is not None for t in times], dtype=bool)
     if not timed.any():
-        raise DataError("io.gpx-without-time", file=path.name, quantity="time", count=len(times))
+        raise DataError("io.track-without-time", file=path.name, quantity="time", count=len(times))
 
     def values(name: str) -> np.ndarray:
         return np.array(points[name], dtype=np.float64)
@@ -75,19 +77,136 @@ def read_gpx(path: Path) -> RawLog:
         held["geoid"] = (values("geoid_height"), "m")
     if np.isfinite(values("speed") * values("course")).any():
         held |= {"speed": (values("speed"), "m/s"), "course": (values("course"), "deg")}
-    log = selected(RawLog.of(path, held, clock=UNIX), timed)
+    return _points_with_time(RawLog.of(path, held, clock=UNIX), timed)
+
+
+def _points_with_time(log: RawLog, timed: NDArray[np.bool_]) -> RawLog:
+    """Keep the points that have a time; others are reported."""
     if not timed.all():
         log.findings.append(
             Finding(
                 "io.points-without-time",
-                file=path.name,
+                file=log.name,
                 quantity="time",
                 severity="note",
                 lost=int((~timed).sum()),
                 count=timed.size,
             )
         )
-    return log
+    return selected(log, timed)
+
+
+# KML and KMZ (OGC 12-007r2, KML 2.3): recorded tracks, and places with a time stamp.
+#
+# Longitude, latitude and height; the height is over the sea (EGM96) where its mode is absolute, and
+# else not stated: it is that over the ground, or not used.
+
+
+detect_kml = Signs(
+    suffixes=(".kml", ".kmz", ".xml"), first=rb"\APK\x03\x04|<kml[\s>]", also=lambda p: _is_kml(p)
+)
+
+
+def _is_kml(path: Path) -> bool:
+    """Whether an archive is a KMZ by its ending; a text is KML by what was found in it."""
+    return path.suffix.lower() == ".kmz" or not head(path).startswith("PK")
+
+
+def read_kml(path: Path) -> RawLog:
+    """Read the points that have a time.
+
+    Raises
+    ------
+    DataError
+        The XML is damaged, or no point has a time.
+    """
+    points = parse("recorders.kml", path)
+    timed = np.array([t is not None for t in points["time"]], dtype=bool)
+    if not timed.any():
+        raise DataError("io.track-without-time", file=path.name, quantity="time", count=timed.size)
+    places = np.array([[*p, np.nan][:3] for p in points["place"]], dtype=np.float64)
+    absolute = all(mode == "absolute" for mode in points["mode"])
+    held = {
+        "lat": (places[:, 1], "deg"),
+        "lon": (places[:, 0], "deg"),
+        "alt_msl" if absolute else "alt_unstated": (places[:, 2], "m"),
+    }
+    return _of_track(path, points["time"], held, timed)
+
+
+def _of_track(
+    path: Path,
+    times: list[Any],
+    held: Mapping[str, tuple[NDArray[Any], str]],
+    timed: NDArray[np.bool_],
+) -> RawLog:
+    """Make a log of the points with a time, which is a text or seconds since 1970.
+
+    DataError: a time is no date.
+    """
+    stamps = np.array(["" if t is None else str(t) for t in times], dtype=object)
+    dates = pd.to_datetime(pd.Series(stamps[timed]), format="ISO8601", utc=True, errors="coerce")
+    if dates.isna().any():
+        at = int(np.flatnonzero(timed)[int(np.argmax(dates.isna()))])
+        raise DataError("io.track-time-no-date", file=path.name, row=at + 1, text=stamps[at])
+    seconds = np.zeros(timed.size)
+    ticks = dates.dt.tz_localize(None).to_numpy().astype("datetime64[ns]").astype(np.int64)
+    seconds[timed] = 1e-9 * ticks
+    return _points_with_time(RawLog.of(path, {"time": (seconds, "s"), **held}, clock=UNIX), timed)
+
+
+# GeoJSON (RFC 7946): points with a time among their properties, or paths with the times of their
+# positions in the property ``coordTimes`` (of togeojson). Heights are over the ellipsoid (4).
+
+#: Properties with the time of a point, and with the times of the positions of a path.
+_TIMES = ("time", "timestamp", "datetime", "date", "when", "utc")
+_TIMES_OF_PATH = ("coordTimes", "times", "timestamps")
+
+
+detect_geojson = Signs(text=r'\A\s*\{[\s\S]{0,2000}?"(?:FeatureCollection|Feature)"')
+
+
+def read_geojson(path: Path) -> RawLog:
+    """Read the points that have a time.
+
+    Raises
+    ------
+    DataError
+        It is not JSON, a coordinate is no number, or no point has a time.
+    """
+    content = from_json(path)
+    times: list[Any] = []
+    places: list[list[float]] = []
+    features = content.get("features", [content]) if isinstance(content, dict) else []
+    for feature in features if isinstance(features, list) else []:
+        if not isinstance(feature, dict):
+            continue
+        said, shape = feature.get("properties") or {}, feature.get("geometry") or {}
+        where: Any = shape.get("coordinates")
+        if shape.get("type") == "Point":
+            stamps = [next((said[n] for n in said if n.lower() in _TIMES), None)]
+            where = [where]
+        elif shape.get("type") == "LineString":
+            nested = said.get("coordinateProperties") or {}
+            lists = [d[n] for d in (said, nested) for n in _TIMES_OF_PATH if n in d]
+            stamps = lists[0] if lists and len(lists[0]) == len(where) else [None] * len(where)
+        else:
+            continue
+        try:
+            places += [[*map(float, p), np.nan][:3] for p in where]
+        except (TypeError, ValueError):
+            row = len(places) + 1
+            raise DataError("io.track-place-no-number", file=path.name, row=row) from None
+        times += stamps
+    timed = np.array([t is not None for t in times], dtype=bool)
+    if not timed.any():
+        raise DataError("io.track-without-time", file=path.name, quantity="time", count=timed.size)
+    table = np.array(places, dtype=np.float64)
+    held = {quantity: (table[:, k], unit) for quantity, k, unit in _GEOJSON}
+    return _of_track(path, times, held, timed)
+
+
+_GEOJSON = (("lat", 1, "deg"), ("lon", 0, "deg"), ("alt", 2, "m"))
 
 
 # Writing: GPX 1.1, speed and course in Garmin's extension.

@@ -160,6 +160,7 @@ CLOCKS = {
     "nanos": "ns",
     "nanoseconds": "ns",
     "ms": "ms",
+    "itow": "ms",  # of u-blox, in every message
     "msec": "ms",
     "utime": "us",  # of LCM, and logs made from it
     "us": "us",
@@ -342,12 +343,24 @@ def _velocities(letter: str, word: str) -> tuple[str, ...]:
 
 #: Degrees, meters over the ellipsoid, meters per second; velocity up is negative velocity down.
 _GEODETIC: dict[str, Quantity] = {
-    "lat": Quantity(_words("lat latitude"), ANGLES),
-    "lon": Quantity(_words("lon lng long longitude"), ANGLES),
+    "lat": Quantity(
+        _words(
+            "lat latitude latitudee7 breite breitengrad latitud latitudine широта 纬度 緯度 위도"
+        ),
+        ANGLES,
+    ),
+    "lon": Quantity(
+        _words(
+            "lon lng long longitude longitudee7 länge lange laenge längengrad langengrad longitud "
+            "longitudine долгота 经度 經度 경도"
+        ),
+        ANGLES,
+    ),
     "alt": Quantity(
         _words(
             "alt altitude h hgt height hell altell heightell ellipsoidalheight heightellipsoid "
-            "altitudeellipsoid"
+            "altitudeellipsoid ellipsoidheight ellheight heightwgs84 altitudewgs84 elevation elev "
+            "ele höhe hohe hoehe altitud altura altitudine quota hoogte высота 高度 海拔 고도"
         ),
         LENGTHS,
     ),

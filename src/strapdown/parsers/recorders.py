@@ -1,15 +1,17 @@
-"""Logs of recorders: PX4 by pyulog, u-blox by pyubx2, MAVLink by pymavlink, FIT and GPX."""
+"""Logs of recorders: PX4 by pyulog, u-blox by pyubx2, MAVLink by pymavlink, FIT, GPX and KML."""
 
 from __future__ import annotations
 
 import io
 import struct
+import zipfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import redirect_stdout
 from datetime import UTC
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -176,6 +178,49 @@ def gpx(path: Path) -> dict[str, list[Any]]:
             if all(value is None for value in fields[name]):
                 fields[name] = [_of_extension(p, name) for p in points]
         return fields | {"time": times, "fix": [p.type_of_gpx_fix for p in points]}
+
+
+def kml(path: Path) -> dict[str, list[Any]]:
+    """Return the points of tracks of a KML or KMZ file, by field.
+
+    ``time``: text, None if a point has none. ``place``: longitude, latitude, and height if stated.
+    ``mode``: of its altitude. The elements of OGC KML 2.3: ``Track`` with ``when`` and ``coord``,
+    and a ``Placemark`` of a ``TimeStamp`` and a ``Point``.
+    """
+    with damage("io.kml-unreadable", path):
+        data = path.read_bytes()
+        if data[:2] == b"PK":
+            with zipfile.ZipFile(path) as archive:
+                name = next(n for n in archive.namelist() if n.lower().endswith(".kml"))
+                data = archive.read(name)
+        out: dict[str, list[Any]] = {"time": [], "place": [], "mode": []}
+        for one in ElementTree.fromstring(data).iter():
+            kind = _tag(one)
+            if kind not in ("Track", "Placemark"):
+                continue
+            inner = list(one) if kind == "Track" else list(one.iter())
+            if kind == "Placemark" and any(_tag(part) in ("Track", "LineString") for part in inner):
+                continue
+            texts = {
+                tag: [str(part.text or "").strip() for part in inner if _tag(part) == tag]
+                for tag in ("when", "coord", "coordinates", "altitudeMode")
+            }
+            places = [
+                [float(v) for v in text.replace(",", " ").split()]
+                for text in texts["coord"] + texts["coordinates"]
+            ]
+            places = [p for p in places if len(p) in (2, 3)]
+            if kind == "Placemark" and len(places) != 1:
+                continue
+            mode = next(iter(texts["altitudeMode"]), "clampToGround")
+            out["time"] += [*texts["when"], *[None] * len(places)][: len(places)]
+            out["place"] += places
+            out["mode"] += [mode] * len(places)
+        return out
+
+
+def _tag(one: Any) -> str:
+    return str(one.tag).rpartition("}")[2]
 
 
 def _of_extension(point: Any, name: str) -> float | None:

@@ -562,7 +562,7 @@ def test_points_without_a_time_are_left_out_and_counted(tmp_path):
     assert list(columns(raw)["lat"][0]) == [45.01, 45.03]
     assert list(raw.rows) == [1, 3] and raw.findings[0].code == "io.points-without-time"
     path.write_text(GPX.format(point(2, time=False)))
-    with pytest.raises(DataError, check=coded("io.gpx-without-time")):
+    with pytest.raises(DataError, check=coded("io.track-without-time")):
         open_stream(path, "gnss")
 
 

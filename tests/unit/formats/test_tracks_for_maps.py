@@ -64,7 +64,7 @@ def test_gpx_without_utc_has_no_times(tmp_path):
     assert "io.written-without-dates" in {f.code for f in findings}
     assert "<time>" not in (tmp_path / "a.gpx").read_text()
     # Which is neither fixes nor a trajectory, and each refusal says so.
-    with pytest.raises(DataError, check=coded("io.gpx-without-time")):
+    with pytest.raises(DataError, check=coded("io.track-without-time")):
         read_gnss(tmp_path / "a.gpx")
     with pytest.raises(DataError, check=coded("io.no-stream")) as refused:
         read_trajectory(tmp_path / "a.gpx")

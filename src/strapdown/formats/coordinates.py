@@ -1,0 +1,169 @@
+"""Latitudes and longitudes as people write them, as signed degrees.
+
+Degrees, minutes and seconds in a text; hemispheres by a letter, behind the number or in a column of
+its own; degrees and minutes in one number, as NMEA 0183 has them; and whole numbers of 1e-7 deg, as
+receivers of u-blox and MAVLink send them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.errors import DataError, Finding
+from strapdown.formats.arrays import numbers
+from strapdown.formats.find_columns import Found
+from strapdown.formats.recording import RawLog
+
+__all__ = ["with_degrees"]
+
+Array = NDArray[np.float64]
+
+#: Quantities, their largest degrees, and the letters of their hemispheres, the negative one last.
+_ANGLES = {"lat": (90.0, "NS"), "lon": (180.0, "EW")}
+#: Of a part of text: degrees, minutes, seconds; a comma may be the sign of decimals.
+_NUMBER = r"(\d+(?:[.,]\d*)?)"
+_TEXT = re.compile(
+    rf"(?P<before>[NSEW])?\s*(?P<sign>[-+−])?\s*{_NUMBER}\s*(?:[°º:d]|deg)?\s*"
+    rf"(?:{_NUMBER}\s*(?:['′’:m]|min)?\s*)?"
+    rf"(?:{_NUMBER}\s*(?:[\"″”s]|''|′′|sec)?\s*)?(?P<behind>[NSEW])?",
+    re.I,
+)
+#: Least height of which whole numbers beside 1e-7 deg are mm: as meters it is above all aircraft.
+_HIGH = 2e4
+
+
+def with_degrees(raw: RawLog, found: Mapping[str, Found]) -> RawLog:
+    """Write the columns of latitude and longitude as signed degrees; other columns as they are.
+
+    `found`: quantity to column. Another form than degrees is reported. DataError: a text is no
+    angle, or the unit of heights beside whole numbers of 1e-7 deg is open.
+    """
+    if raw.stated or not _ANGLES.keys() <= found.keys():
+        return raw
+    if any(found[q].factor != 1.0 for q in _ANGLES):  # radians
+        return raw
+    changed: dict[str, NDArray[Any]] = {}
+    for quantity, (_, letters) in _ANGLES.items():
+        source = found[quantity].source
+        values = raw.columns[source]
+        if values.dtype.kind == "O" and any(c in str(values[0]).upper() for c in letters + "°:'"):
+            changed[source] = _of_texts(raw, source, quantity, letters)
+        side = _sides(raw, source, letters)
+        if side is not None:
+            size = changed.get(source, numbers(raw, source, quantity))
+            changed[source] = side * np.abs(np.asarray(size, dtype=np.float64))
+    places = {q: changed.get(found[q].source, raw.columns[found[q].source]) for q in _ANGLES}
+    findings = []
+    if all(v.dtype.kind in "iuf" for v in places.values()):
+        form, scaled = _in_one_number(places)
+        changed |= {found[q].source: v for q, v in scaled.items()}
+        # A name that says it (latitudeE7) says that heights are not scaled likewise.
+        if form == "1e-7 deg" and not found["lat"].source.lower().endswith("e7"):
+            changed |= _heights_in_mm(raw, found)
+        if form:
+            findings.append(
+                Finding(
+                    "io.coordinates-in-one-number",
+                    severity="note",
+                    file=raw.name,
+                    quantity="lat, lon",
+                    form=form,
+                    lat=float(scaled["lat"][0]),
+                    lon=float(scaled["lon"][0]),
+                )
+            )
+    if not changed:
+        return raw
+    columns = {name: changed.get(name, values) for name, values in raw.columns.items()}
+    return dataclasses.replace(raw, columns=columns, findings=[*raw.findings, *findings])
+
+
+def _of_texts(raw: RawLog, source: str, quantity: str, letters: str) -> Array:
+    """Return degrees of texts, (n,): ``48°12'30.5"N``, ``48 12.508 N``, ``N48.2085``."""
+    out = np.full(raw.columns[source].size, np.nan)
+    for k, text in enumerate(raw.columns[source]):
+        plain = "" if text is None else str(text).strip()
+        if plain.lower() in ("", "nan"):
+            continue
+        match = _TEXT.fullmatch(plain)
+        side = "".join(filter(None, (match["before"], match["behind"]))).upper() if match else "??"
+        parts = [float(p.replace(",", ".")) for p in match.groups()[2:5] if p] if match else []
+        # Minutes and seconds are below 60, and what is before them is whole.
+        fits = all(p < 60.0 for p in parts[1:]) and all(p % 1.0 == 0.0 for p in parts[:-1])
+        if match is None or not fits or len(side) > 1 or side not in letters:
+            raise DataError(
+                "io.no-coordinate",
+                file=raw.name,
+                row=raw.row(k),
+                quantity=quantity,
+                text=plain,
+                source=source,
+            )
+        size = sum(part / 60.0**power for power, part in enumerate(parts))
+        out[k] = -size if side == letters[1] or match["sign"] in ("-", "−") else size
+    return out
+
+
+def _sides(raw: RawLog, source: str, letters: str) -> Array | None:
+    """Return the signs by a column of the letters of hemispheres, the nearest behind; or None."""
+    names = list(raw.columns)
+    at = names.index(source)
+    for name in names[at + 1 :] + names[:at]:
+        values = raw.columns[name]
+        if values.dtype.kind != "O" or str(values[0]).strip().upper() not in tuple(letters):
+            continue
+        said = np.array(["" if v is None else str(v).strip().upper() for v in values])
+        if set(said.tolist()) <= {*letters, ""}:
+            return np.where(said == letters[1], -1.0, 1.0)
+    return None
+
+
+def _in_one_number(places: Mapping[str, NDArray[Any]]) -> tuple[str, dict[str, Array]]:
+    """Return the form of numbers that no degrees are, and their degrees; empty if they may be."""
+    values = {q: np.asarray(v, dtype=np.float64) for q, v in places.items()}
+    known = {q: np.abs(v[np.isfinite(v)]) for q, v in values.items()}
+    if any(not v.size for v in known.values()):
+        return "", {}
+    beyond = any(known[q].max() > most for q, (most, _) in _ANGLES.items())
+    if not beyond:
+        return "", {}
+    if all(
+        (v % 1.0 == 0.0).all() and v.max() <= 1e7 * _ANGLES[q][0] for q, v in known.items()
+    ) and (max(known["lat"].max(), known["lon"].max()) > 1e5):
+        return "1e-7 deg", {q: v * 1e-7 for q, v in values.items()}
+    if all((v % 100.0 < 60.0).all() and v.max() <= 100.0 * _ANGLES[q][0] for q, v in known.items()):
+        whole = {q: np.trunc(v / 100.0) for q, v in values.items()}
+        return "ddmm.mmmm", {q: whole[q] + (v - 100.0 * whole[q]) / 60.0 for q, v in values.items()}
+    return "", {}
+
+
+def _heights_in_mm(raw: RawLog, found: Mapping[str, Found]) -> dict[str, Array]:
+    """Return heights in m that are whole numbers of mm; ask where meters are as likely."""
+    out = {}
+    for quantity in ("alt", "alt_msl"):
+        one = found.get(quantity)
+        if one is None or one.stated:
+            continue
+        heights = np.asarray(numbers(raw, one.source, quantity), dtype=np.float64)
+        known = heights[np.isfinite(heights)]
+        if not known.size or (known % 1.0 != 0.0).any():
+            continue
+        if np.median(np.abs(known)) < _HIGH:
+            raise DataError(
+                "io.height-unit-open",
+                file=raw.name,
+                quantity=quantity,
+                of_what=quantity,
+                source=one.source,
+                height=float(known[0]),
+                flags=f"--gnss-units {quantity}=mm",
+                keys=f'units = {{{quantity} = "mm"}}',
+            )
+        out[one.source] = heights * 1e-3
+    return out
