@@ -312,7 +312,7 @@ def read_gnss(
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     datum_height_m: float | None = None,
-    origin: tuple[float, float, float] | None = None,
+    origin: tuple[float, float, float] | str | None = None,
     position_sd_m: float | tuple[float, float, float] | None = None,
     velocity_sd_m_per_s: float | tuple[float, float, float] | None = None,
     repair: bool = False,
@@ -334,8 +334,9 @@ def read_gnss(
     datum_height_m : float, optional
         Height over the ellipsoid of the level from which the file counts its heights: that of
         the geoid, or of the point of take-off.
-    origin : tuple of float, optional
-        Latitude in deg, longitude in deg and height in m of the origin of local positions.
+    origin : tuple of float, or str, optional
+        Latitude in deg, longitude in deg and height in m of the origin of local positions; or the
+        zone of UTM of northings and eastings, with its hemisphere: ``33N``.
     position_sd_m, velocity_sd_m_per_s : float or tuple of float, optional
         Standard deviations north, east, down of each fix, replacing those of the file.
     repair : bool

@@ -154,7 +154,10 @@ class FixFlags:
     ] = None
     gnss_origin: Annotated[
         str | None,
-        fixes("LAT,LON,HEIGHT", "Origin of local positions, deg, deg, m over the ellipsoid."),
+        fixes(
+            "LAT,LON,HEIGHT",
+            "Origin of local positions, deg, deg, m over the ellipsoid; or their UTM zone: 33N.",
+        ),
     ] = None
 
     gnss_position_sd: Annotated[
@@ -184,7 +187,7 @@ def fix_keys(given: Mapping[str, Any], path: Path | None) -> dict[str, Any]:
         "columns": columns or None,
         "units": units or None,
         "datum_height_m": given["gnss_datum_height"],
-        "origin": as_origin(given["gnss_origin"], "--gnss-origin"),
+        "origin": _origin_or_zone(given["gnss_origin"]),
         "position_sd_m": given["gnss_position_sd"],
         "velocity_sd_m_per_s": given["gnss_velocity_sd"],
     }
@@ -210,6 +213,12 @@ def as_origin(text: str | None, flag: str) -> tuple[float, float, float] | None:
     except ValueError:
         raise ConfigError("cli.bad-origin", quantity=flag, text=text) from None
     return lat, lon, height
+
+
+def _origin_or_zone(text: str | None) -> tuple[float, float, float] | str | None:
+    """Origin of local positions, or the zone of UTM; ConfigError: it is neither."""
+    zone = text is not None and "," not in text
+    return text if zone else as_origin(text, "--gnss-origin")
 
 
 def log_keys(given: Mapping[str, Any]) -> dict[str, Any]:

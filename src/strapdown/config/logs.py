@@ -24,7 +24,7 @@ from strapdown.config.spec import (
     refused,
 )
 from strapdown.formats.columns import parse_axes
-from strapdown.formats.gnss_fixes import GnssOptions
+from strapdown.formats.gnss_fixes import GnssOptions, utm_zone
 from strapdown.formats.recording import as_stated
 from strapdown.sensors.bridge import target_of
 from strapdown.sensors.catalogue import load_sensor
@@ -85,8 +85,8 @@ class FixesTable(Spec):
     units: dict[Word, Word] = Field(default_factory=dict)
     #: Height over the ellipsoid of the level of the file's heights: the geoid, or the take-off.
     datum_height_m: Annotated[Number, Field(ge=-500.0, le=9000.0)] | None = None
-    #: Latitude, longitude (deg) and height (m) of the origin of local positions.
-    origin: Triple | None = None
+    #: Latitude, longitude (deg) and height (m) of the origin of local positions; or their UTM zone.
+    origin: Triple | Annotated[Word, accepted_by(utm_zone)] | None = None
     #: Standard deviations, replacing those of the file.
     position_sd_m: OneOrThree | None = None
     velocity_sd_m_per_s: OneOrThree | None = None
@@ -256,6 +256,10 @@ def flags_of(log: LogTable, axes: str | None) -> str:
     return " ".join(flag for flag in flags if flag)
 
 
+def _listed(origin: tuple[float, float, float] | str | None) -> str | None:
+    return ",".join(map(repr, origin)) if isinstance(origin, tuple) else origin
+
+
 def flags_of_fixes(fixes: FixesTable | None) -> str:
     """Return the options of the command line that read fixes as their table does."""
     if fixes is None:
@@ -266,7 +270,7 @@ def flags_of_fixes(fixes: FixesTable | None) -> str:
         ("--gnss-columns", ",".join(f"{q}={c}" for q, c in fixes.columns.items())),
         ("--gnss-units", ",".join(f"{q}={u}" for q, u in fixes.units.items())),
         ("--gnss-datum-height", fixes.datum_height_m),
-        ("--gnss-origin", None if fixes.origin is None else ",".join(map(repr, fixes.origin))),
+        ("--gnss-origin", _listed(fixes.origin)),
         ("--gnss-position-sd", fixes.position_sd_m),
         ("--gnss-velocity-sd", fixes.velocity_sd_m_per_s),
     ):

@@ -31,7 +31,7 @@ _NUMBER = r"(\d+(?:[.,]\d*)?)"
 _TEXT = re.compile(
     rf"(?P<before>[NSEW])?\s*(?P<sign>[-+−])?\s*{_NUMBER}\s*(?:[°º:d]|deg)?\s*"
     rf"(?:{_NUMBER}\s*(?:['′’:m]|min)?\s*)?"
-    rf"(?:{_NUMBER}\s*(?:[\"″”s]|''|′′|sec)?\s*)?(?P<behind>[NSEW])?",
+    rf"(?:{_NUMBER}\s*(?:[\"″”]|''|′′|s(?=\s*[NSEW]))?\s*)?(?P<behind>[NSEW])?",
     re.I,
 )
 #: Least height of which whole numbers beside 1e-7 deg are mm: as meters it is above all aircraft.
@@ -94,8 +94,8 @@ def _of_texts(raw: RawLog, source: str, quantity: str, letters: str) -> Array:
         match = _TEXT.fullmatch(plain)
         side = "".join(filter(None, (match["before"], match["behind"]))).upper() if match else "??"
         parts = [float(p.replace(",", ".")) for p in match.groups()[2:5] if p] if match else []
-        # Minutes and seconds are below 60, and what is before them is whole.
-        fits = all(p < 60.0 for p in parts[1:]) and all(p % 1.0 == 0.0 for p in parts[:-1])
+        # Minutes and seconds are up to 60, by rounding, and what is before them is whole.
+        fits = all(p <= 60.0 for p in parts[1:]) and all(p % 1.0 == 0.0 for p in parts[:-1])
         if match is None or not fits or len(side) > 1 or side not in letters:
             raise DataError(
                 "io.no-coordinate",

@@ -611,10 +611,10 @@ def one_clock_of_parts(
 
 
 def _digits_of_clock(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Return a date and a time of day that are numbers of digits, 240506 and 93015.2, as texts.
+    """Return a date and a time of day that are numbers of digits, 20240506 and 93015.2, as texts.
 
-    Both are required, by their names. A date of which year and day are open (240506 may be of 2024
-    or of 2006) becomes no date, and the time counts from midnight.
+    Both are required, by their names. A date of six digits becomes none, for it leaves open which
+    of them are the year (240506 may be of 2024 or of 2006), and the time counts from midnight.
     """
     named = {
         word: [n for n, c in columns.items() if c.dtype.kind in "iuf" and _says(n, word)]
@@ -630,28 +630,19 @@ def _digits_of_clock(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[A
         (v < 0).any() or (v >= most).any() for v, most in zip(parts, (24, 60, 60), strict=True)
     ):
         return {}
-    orders = {"%Y%m%d": 10**7, "%y%m%d": 0, "%d%m%y": 0}
-    found = []
-    for order, least in orders.items():
-        texts = [f"{int(d):0{8 if least else 6}d}" for d in np.unique(day)]
-        try:
-            read = {float(t): datetime.strptime(t, order) for t in texts}
-        except ValueError:
-            continue
-        if all(2000 <= d.year <= 2045 for d in read.values()):
-            found.append(read)
-    if not found:
-        return {}
+    texts = [f"{int(d):06d}" for d in day.tolist()]
+    try:
+        dates = {t: datetime.strptime(t, "%Y%m%d") for t in set(texts)}
+        sure = all(len(t) == 8 and 2000 <= d.year <= 2045 for t, d in dates.items())
+    except ValueError:
+        sure = False
     times = [
         f"{int(h):02d}:{int(m):02d}:{second:09.6f}"
         for h, m, second in zip(parts[0], parts[1], of_day - 100.0 * (whole // 100), strict=True)
     ]
-    out = {clock: np.array(times, dtype=object)}
     # A text of digits is no clock.
-    sure = len(found) == 1
-    days = [f"{found[0][d]:%Y-%m-%d}" if sure else f"{int(d):06d}" for d in day.tolist()]
-    out[date] = np.array(days, dtype=object)
-    return out
+    days = [f"{dates[t]:%Y-%m-%d}" if sure else t for t in texts]
+    return {clock: np.array(times, dtype=object), date: np.array(days, dtype=object)}
 
 
 def _says(name: str, word: str) -> bool:

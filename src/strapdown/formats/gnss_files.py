@@ -25,12 +25,13 @@ from strapdown.formats.gnss_fixes import (
     Fixes,
     GnssOptions,
     table_of_fixes,
+    utm_zone,
 )
 from strapdown.formats.gnss_pos import QUALITY
 from strapdown.formats.recording import RawLog
 from strapdown.formats.trajectory_readers import EARTH
 from strapdown.formats.vocabularies import FIXES
-from strapdown.frames import geodetic_from_ecef, geodetic_from_ned
+from strapdown.frames import geodetic_from_ecef, geodetic_from_ned, geodetic_from_utm
 from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD
 from strapdown.units import OF_TABLES, SPEEDS, TIME_UNITS, unit_of
 
@@ -190,6 +191,8 @@ def _place(
 ) -> tuple[Array, str]:
     """Return geodetic positions, and the quantity of their heights."""
     local = not set(_GEODETIC) <= found.keys() and not set(_ECEF) <= found.keys()
+    if isinstance(options.origin, str) and local and not {"up", *_HEIGHTS} & found.keys():
+        raise _without_up(raw)
     if options.origin is not None and not local:
         raise ConfigError("io.origin-beside-positions", file=raw.name, quantity="origin")
     if set(_GEODETIC) <= found.keys():
@@ -203,21 +206,50 @@ def _place(
     if not local:
         return geodetic_from_ecef(np.column_stack([values(q) for q in _ECEF])), "alt"
     if options.origin is None:
+        _refuse_zone_open(raw, found, values)
         raise DataError(
             "io.local-positions-origin-open",
             file=raw.name,
             quantity=", ".join(found[q].source for q in _LOCAL),
         )
+    if isinstance(options.origin, str):
+        zone, south = utm_zone(options.origin)
+        level = geodetic_from_utm(values("east"), values("north"), zone, south=south)
+        kind = next((q for q in _HEIGHTS if q in found), "")
+        heights = _height(found, values, raw) if kind else values("up")
+        return np.column_stack([level, heights]), kind or "alt"
     if "up" not in found:
-        raise DataError(
-            "io.missing-columns-2",
-            file=raw.name,
-            missing=["up"],
-            columns=list(raw.columns),
-            missing_2="up",
-        )
+        raise _without_up(raw)
     ned = np.column_stack([values("north"), values("east"), -values("up")])
     return geodetic_from_ned(ned, options.origin), "alt"
+
+
+def _without_up(raw: RawLog) -> DataError:
+    return DataError(
+        "io.missing-columns-2",
+        file=raw.name,
+        missing=["up"],
+        columns=list(raw.columns),
+        missing_2="up",
+    )
+
+
+#: Eastings and northings of UTM, m, but for northings just off the equator.
+_EASTINGS, _NORTHINGS = (1e5, 9e5), (1e5, 1e7)
+
+
+def _refuse_zone_open(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]) -> None:
+    """Refuse coordinates as of UTM, whose zone the user has to state."""
+    east, north = (float(np.nanmedian(values(q))) for q in ("east", "north"))
+    if not (_EASTINGS[0] < east < _EASTINGS[1] and _NORTHINGS[0] < north < _NORTHINGS[1]):
+        return
+    raise DataError(
+        "io.utm-zone-open",
+        file=raw.name,
+        quantity=", ".join(found[q].source for q in _LOCAL),
+        east=east,
+        north=north,
+    )
 
 
 def _height(found: dict[str, Found], values: Callable[[str], Array], raw: RawLog) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -33,6 +34,17 @@ POSITION_SDS = "0.02 suits RTK, 1 a code receiver with corrections, 5 one withou
 VELOCITY_SDS = "0.05 suits RTK, 0.3 a code receiver by Doppler, 1 one that differences places"
 
 
+def utm_zone(text: str) -> tuple[int, bool]:
+    """Return the zone of UTM, 1 to 60, and whether it is of the south, of ``33N``.
+
+    ConfigError: the text is no zone with its hemisphere.
+    """
+    match = re.fullmatch(r"\s*(?:UTM\s*)?(\d{1,2})\s*([NS])\s*", text, re.I)
+    if match is None or not 1 <= int(match[1]) <= 60:
+        raise ConfigError("io.no-utm-zone", quantity="origin", text=text)
+    return int(match[1]), match[2].upper() == "S"
+
+
 @dataclass(frozen=True)
 class GnssOptions:
     """User's statements about a file of fixes; None means as in the file.
@@ -49,8 +61,9 @@ class GnssOptions:
     datum_height : float, optional, m
         Height over the ellipsoid of the level from which the file counts its heights: that of
         the geoid, or of the point of take-off.
-    origin : tuple of float, optional, deg, deg, m
-        Latitude, longitude and height of the origin of local positions (``north east up``).
+    origin : tuple of float, or str, optional, deg, deg, m
+        Latitude, longitude and height of the origin of local positions (``north east up``); or the
+        zone of UTM, with its hemisphere, of northings and eastings: ``33N``.
     position_sd, velocity_sd : float or tuple of float, optional, m and m/s
         Standard deviations north, east, down, or one for all three, for each fix; they replace
         those of the file.
@@ -68,7 +81,7 @@ class GnssOptions:
     columns: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     datum_height: float | None = None
-    origin: tuple[float, float, float] | None = None
+    origin: tuple[float, float, float] | str | None = None
     position_sd: Sd | None = None
     velocity_sd: Sd | None = None
     unstated_position_sd: float | None = None
@@ -77,6 +90,8 @@ class GnssOptions:
     repair: bool = False
 
     def __post_init__(self) -> None:
+        if isinstance(self.origin, str):
+            utm_zone(self.origin)
         for name in (
             "position_sd",
             "velocity_sd",

@@ -151,7 +151,7 @@ def _of_track(
         raise DataError("io.track-time-no-date", file=path.name, row=at + 1, text=stamps[at])
     seconds = np.zeros(timed.size)
     ticks = dates.dt.tz_localize(None).to_numpy().astype("datetime64[ns]").astype(np.int64)
-    seconds[timed] = 1e-9 * ticks
+    seconds[timed] = ticks / 1e9
     return _points_with_time(RawLog.of(path, {"time": (seconds, "s"), **held}, clock=UNIX), timed)
 
 
@@ -183,13 +183,12 @@ def read_geojson(path: Path) -> RawLog:
             continue
         said, shape = feature.get("properties") or {}, feature.get("geometry") or {}
         where: Any = shape.get("coordinates")
+        stamps = [next((said[n] for n in said if n.lower() in _TIMES), None)]
         if shape.get("type") == "Point":
-            stamps = [next((said[n] for n in said if n.lower() in _TIMES), None)]
             where = [where]
         elif shape.get("type") == "LineString":
             nested = said.get("coordinateProperties") or {}
-            lists = [d[n] for d in (said, nested) for n in _TIMES_OF_PATH if n in d]
-            stamps = lists[0] if lists and len(lists[0]) == len(where) else [None] * len(where)
+            stamps = next((d[n] for d in (said, nested) for n in _TIMES_OF_PATH if n in d), [])
         else:
             continue
         try:
@@ -197,7 +196,7 @@ def read_geojson(path: Path) -> RawLog:
         except (TypeError, ValueError):
             row = len(places) + 1
             raise DataError("io.track-place-no-number", file=path.name, row=row) from None
-        times += stamps
+        times += stamps if len(stamps) == len(where) else [None] * len(where)
     timed = np.array([t is not None for t in times], dtype=bool)
     if not timed.any():
         raise DataError("io.track-without-time", file=path.name, quantity="time", count=timed.size)

@@ -359,8 +359,8 @@ _GEODETIC: dict[str, Quantity] = {
     "alt": Quantity(
         _words(
             "alt altitude h hgt height hell altell heightell ellipsoidalheight heightellipsoid "
-            "altitudeellipsoid ellipsoidheight ellheight heightwgs84 altitudewgs84 elevation elev "
-            "ele höhe hohe hoehe altitud altura altitudine quota hoogte высота 高度 海拔 고도"
+            "altitudeellipsoid ellipsoidheight ellheight heightwgs84 altitudewgs84 "
+            "höhe hohe hoehe altitud altura altitudine quota hoogte высота 高度 고도"
         ),
         LENGTHS,
     ),
@@ -399,7 +399,9 @@ FIXES = Vocabulary(
         "week": Quantity(_words("week gpsweek weeknumber wn")),
         **_GEODETIC,
         "alt_msl": Quantity(
-            _words("hmsl altmsl altitudemsl heightmsl mslaltitude mslheight orthometricheight"),
+            _words(
+                "hmsl altmsl altitudemsl heightmsl mslaltitude mslheight orthometricheight 海拔"
+            ),
             LENGTHS,
         ),
         "geoid": Quantity(
@@ -412,10 +414,15 @@ FIXES = Vocabulary(
             ),
             LENGTHS,
         ),
-        # Of formats that do not say whether it is over the ellipsoid or over the sea.
-        "alt_unstated": Quantity((), LENGTHS),
-        "north": Quantity(_words("north posn positionnorth northposition"), LENGTHS),
-        "east": Quantity(_words("east pose positioneast eastposition"), LENGTHS),
+        # Of formats, and a word, that do not say whether it is over the ellipsoid or over the sea.
+        "alt_unstated": Quantity(_words("elevation elev ele"), LENGTHS),
+        "north": Quantity(
+            _words("north posn positionnorth northposition northing northings utmn utmnorthing"),
+            LENGTHS,
+        ),
+        "east": Quantity(
+            _words("east pose positioneast eastposition easting eastings utme utmeasting"), LENGTHS
+        ),
         "up": Quantity(_words("up posu positionup"), LENGTHS, _words("down posd positiondown")),
         **{
             f"ecef_{a}": Quantity((f"ecef{a}", f"{a}ecef", f"positionecef{a}"), LENGTHS)
