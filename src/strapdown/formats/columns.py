@@ -261,7 +261,7 @@ def _by_unit(bare: str, written: str, said: ColumnName) -> ColumnName:
     """
     words = _words_of(bare)
     axes = [w for w in words if w in _AXES]
-    other = [w for w in words if w not in _AXES and w not in NOISE]
+    other = [w for w in words if w not in _AXES and w not in (*NOISE, said.unit)]
     if len(axes) != 1 and said.unit in ACCEL_UNITS:
         axes = [a for a, known in DIRECTIONS.items() for w in other if w in known]
         other = [w for w in other if not any(w in known for known in DIRECTIONS.values())]

@@ -1083,9 +1083,10 @@ def test_a_rate_by_its_unit_and_its_axis(tmp_path):
 def test_an_accelerometer_by_the_axes_of_a_car_in_short(tmp_path):
     """As MoTeC and others name them; the order of the columns is not that of the axes."""
     turns = [f"Gyro {turn} Velocity" for turn in ("Roll", "Pitch", "Yaw")]
-    forces = [f"G Force {axis}" for axis in ("Long", "Lat", "Vert")]
-    header = ",".join(["Time", *turns, *forces])
-    check(read(tmp_path, [header, *rows()], gyro_unit="deg/s", accel_unit="g"))
+    for name in ("G Force {}", "{}Acc", "{}G"):
+        forces = [name.format(axis) for axis in ("Long", "Lat", "Vert")]
+        header = ",".join(["Time", *turns, *forces])
+        check(read(tmp_path, [header, *rows()], gyro_unit="deg/s", accel_unit="g"))
 
 
 @pytest.mark.parametrize(
