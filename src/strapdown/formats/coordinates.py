@@ -56,7 +56,7 @@ def with_degrees(raw: RawLog, found: Mapping[str, Found]) -> RawLog:
             changed[source] = _of_texts(raw, source, quantity, letters)
         side = _sides(raw, source, letters)
         if side is not None:
-            size = changed.get(source, numbers(raw, source, quantity))
+            size = changed[source] if source in changed else numbers(raw, source, quantity)
             changed[source] = side * np.abs(np.asarray(size, dtype=np.float64))
     places = {q: changed.get(found[q].source, raw.columns[found[q].source]) for q in _ANGLES}
     findings = []

@@ -111,6 +111,16 @@ def test_hemispheres_in_columns_of_their_own(tmp_path, signed):
     np.testing.assert_allclose(got["lon"], LON, rtol=0, atol=1e-6)
 
 
+def test_degrees_and_minutes_beside_columns_of_hemispheres(tmp_path):
+    rows = []
+    for k in range(COUNT):
+        lat, lon = (degrees_minutes(v[k], "NS", "{d}°{m:.6f}'") for v in (LAT, LON))
+        rows.append(f"{k},{lat},S,{lon},W,{ALT}")
+    got = fixes(table(tmp_path, "time,lat,NS,lon,EW,alt", rows))
+    np.testing.assert_allclose(got["lat"], -LAT, rtol=0, atol=DIGIT)
+    np.testing.assert_allclose(got["lon"], -LON, rtol=0, atol=DIGIT)
+
+
 def test_a_date_and_a_time_of_digits(tmp_path):
     """As the loggers of Columbus write them, with letters behind the angles."""
     header = "INDEX,TAG,DATE,TIME,LATITUDE N/S,LONGITUDE E/W,HEIGHT,SPEED,HEADING"
