@@ -322,6 +322,10 @@ def _by_axis(vector: re.Match[str]) -> str:
     )
 
 
+#: Most lines between names and rows of which the names have another separator.
+ABOVE = 4
+
+
 # The top of a table: where rows of numbers begin, and what the lines above them say.
 
 
@@ -357,7 +361,7 @@ class _Top:
         lines = [_named(line, self.separator, width) for line in near] + [None, None]
         names, over = lines[:2]
         if names is None and near:
-            names = self._behind_a_word(near[0], width)
+            names = self._behind_a_word(near[0], width) or self._names_with_commas(width)
         if names is None:
             below = self._units_in_comment(width, kinds)
             named = _above(self.above[:-1] if below else self.above, width, self.separator)
@@ -393,6 +397,14 @@ class _Top:
         if not named or read_name(named[0]).quantity is None:
             return None
         return [word, *named] if word and not is_data(word) else None
+
+    def _names_with_commas(self, width: int) -> list[str] | None:
+        """Names that commas separate, over rows that blanks do, as POSPac exports them."""
+        if self.separator is not None:
+            return None
+        lines = [fields_of(line, ",") for line in reversed(self.above[-ABOVE:])]
+        fits = (n for n in lines if len(n) == width and all(n) and not are_data(n))
+        return next(fits, None)
 
     def _units_in_comment(self, width: int, kinds: Sequence[str]) -> list[str] | None:
         """Units in the last comment, where the one before it has the names."""

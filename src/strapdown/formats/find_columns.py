@@ -728,6 +728,8 @@ def find_quantities(
                 meant = said.quantity
             if meant is None or (evidence == 2 and not _is_plain(name, read, known)):
                 continue
+            if meant in found and name.startswith(f"{found[meant].source} ("):
+                continue  # the same name once more (`csv`): the first counts
             sign = said.sign if said.quantity == meant else 1.0
             factor = sign * _factor(meant, known[meant], said.unit, name, file)
             if meant in found and _in_other_unit(found[meant].source, name):

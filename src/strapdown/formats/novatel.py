@@ -309,7 +309,11 @@ _UNIT = re.compile(r"\([^)]*\)|\S+")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 PLACE, ANGLES = ("latitude", "longitude", "h-ell"), ("roll", "pitch", "heading")
 LEVEL, BODY = ("vnorth", "veast", "vup"), ("velbdyx", "velbdyy", "velbdyz")
-EXPLORER_UNITS = {"gpstime": ("sec", "s"), "latitude": ("deg", "+/-d m s"), "h-ell": ("m",)}
+EXPLORER_UNITS = {
+    "gpstime": ("sec", "s"),
+    "latitude": ("deg", "+/-d m s", "d m s"),
+    "h-ell": ("m",),
+}
 EXPLORER_UNITS |= {"longitude": EXPLORER_UNITS["latitude"], **dict.fromkeys(ANGLES, ("deg",))}
 EXPLORER_UNITS |= dict.fromkeys((*LEVEL, *BODY), ("m/s",))
 
@@ -365,7 +369,7 @@ def _values(path: Path, lines: list[str]) -> dict[str, Any]:
         if name in EXPLORER_UNITS and unit not in EXPLORER_UNITS[name]:
             quantity = {"quantity": name, "unit": unit}
             raise DataError("io.inertial-explorer-unit", file=path.name, **quantity)
-    widths = [3 if unit == "+/-d m s" else 1 for unit in units]
+    widths = [3 if unit.endswith("d m s") else 1 for unit in units]
     starts = np.cumsum([0, *widths])
     rows = []
     for k, line in enumerate(lines[at + 2 :], at + 3):

@@ -992,10 +992,12 @@ Master 1:    Name base, Status ENABLED
 """
 
 
-def test_inertial_explorer_degrees_and_velocity_of_the_body(tmp_path):
+@pytest.mark.parametrize("dms", ["(+/-D M S)", "(D M S)"])
+def test_inertial_explorer_degrees_and_velocity_of_the_body(tmp_path, dms):
     names = "UTCDate Week GPSTime Latitude Longitude H-Ell VelBdyX VelBdyY VelBdyZ "
     names += "Roll Pitch Heading Q"
     units = "(MDY) (weeks) (sec) (+/-D M S) (+/-D M S) (m) (m/s) (m/s) (m/s) (deg) (deg) (deg)   "
+    units = units.replace("(+/-D M S)", dms)
     rows = "04/03/2019 2254 604799.00 30 30 36.0 -0 30 36.0 12.5 0.5 10 -0.25 0.0 0.0 270.0 1\n"
     rows += "04/03/2019 2255 0.00  30 30 36.0  -0 30 37.0  12.5  0.5 10.0 -0.25  0.0 0.0 90.0 1\n"
     path = tmp_path / "truth.txt"

@@ -1112,3 +1112,21 @@ def test_names_with_words_that_are_not_known_are_asked_about(tmp_path):
     both = [f"{line},9,9,9" for line in rows()]
     known = HEADER + ",gyro_zorp_x,gyro_zorp_y,gyro_zorp_z"
     check(read(tmp_path, [known, *both]))
+
+
+def test_names_between_commas_over_rows_between_blanks(tmp_path):
+    """As POSPac exports a trajectory: a title, names, their units in words, a blank line, rows."""
+    names = [
+        *("TIME", "DISTANCE", "EASTING", "NORTHING", "ELLIPSOID HEIGHT", "LATITUDE", "LONGITUDE"),
+        *("ELLIPSOID HEIGHT", "ROLL", "PITCH", "HEADING"),
+        *("EAST VELOCITY", "NORTH VELOCITY", "UP VELOCITY"),
+    ]
+    values = [0.0, 413000.0, 6179000.0, 160.0, 55.7, 37.6, 160.0, 1.0, -2.0, 33.0, 3.0, 4.0, -0.5]
+    rows_of = [f"{300000 + k:.3f} " + " ".join(f"{v:.6f}" for v in values) for k in range(9)]
+    units = "(time in Sec, distance in Meters, lat, long in Degrees)"
+    path = tmp_path / "export.txt"
+    path.write_text("\n".join(["POSPac MMS 8.4", ", ".join(names), units, "", *rows_of]) + "\n")
+    got = sd.read_trajectory(path)
+    expected = [55.7, 37.6, 160.0, 4.0, 3.0, 0.5, 1.0, -2.0, 33.0]
+    np.testing.assert_array_equal(got.to_numpy()[4], expected)
+    np.testing.assert_array_equal(got.index, 300000.0 + np.arange(9))
