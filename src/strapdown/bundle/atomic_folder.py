@@ -33,16 +33,6 @@ from typing import Any
 
 from strapdown.errors import ConfigError
 
-__all__ = [
-    "HeldError",
-    "check_destination",
-    "claimed",
-    "flush_entry",
-    "open_locked",
-    "replace_file",
-    "written_whole",
-]
-
 MANIFEST = "manifest.json"
 #: What a system promises differs; tests stand in for the others.
 WINDOWS, MACOS = os.name == "nt", sys.platform == "darwin"

@@ -31,18 +31,6 @@ from strapdown.units import (
     TIME_UNITS,
 )
 
-__all__ = [
-    "POINT",
-    "SYNONYMS",
-    "UNITS",
-    "along_body",
-    "read_aid_table",
-    "read_control_points",
-    "read_reference_path",
-    "read_stream",
-]
-
-
 Array = NDArray[np.float64]
 #: Unit of a table's column to the units accepted in a file, with their factors to it.
 UNITS: dict[str, Mapping[str, float]] = {

@@ -18,16 +18,6 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats.columns import read_name
 from strapdown.formats.recording import RawLog, stated_by
 
-__all__ = [
-    "day_nanoseconds",
-    "excel_nanoseconds",
-    "is_date",
-    "is_day_time",
-    "is_stamp",
-    "nanoseconds_of",
-    "told_by_file_rows",
-]
-
 _DATE = r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}"
 _STAMP = re.compile(
     rf"(?:(?P<date>{_DATE})(?:[T,]|[ T,] ?))?"

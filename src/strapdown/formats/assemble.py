@@ -71,17 +71,6 @@ from strapdown.tables.checks import all_finite
 from strapdown.tables.on_disk import filled, let_go, room, stored
 from strapdown.units import TIME_UNITS, factor_of, parse_unit
 
-__all__ = [
-    "assemble",
-    "clock_of_log",
-    "finite_rows",
-    "require_accel",
-    "sampling_of_rates",
-    "stamps_of_log",
-    "time_reading",
-]
-
-
 Array = NDArray[np.float64]
 
 

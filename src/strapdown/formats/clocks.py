@@ -34,32 +34,10 @@ from strapdown.formats.inference.conclusion import (
     wrap_bits,
 )
 from strapdown.formats.recording import Origin
-from strapdown.tables.checks import RELATIVE
+from strapdown.tables.checks import RELATIVE as RELATIVE
 from strapdown.tables.on_disk import filled, let_go, step_range
 from strapdown.tables.sample_clock import sample_clock
 from strapdown.units import TIME_UNITS
-
-__all__ = [
-    "GPS",
-    "RELATIVE",
-    "UNIX",
-    "WEEK",
-    "Clock",
-    "clock_of",
-    "clock_of_name",
-    "counted",
-    "gps_from_unix",
-    "leap_seconds",
-    "on_clock_of",
-    "own_ns",
-    "time_column",
-    "unix_from_gps",
-    "unrolled",
-    "usual_step",
-    "with_clock",
-    "year_of",
-]
-
 
 Array = NDArray[np.float64]
 GPS, UNIX = "gps-seconds-of-week", "unix"

@@ -41,16 +41,6 @@ from strapdown.formats.vocabularies import (
 )
 from strapdown.units import FACTORS, GYRO_UNITS, OF_LOGS, find_unit, unit_of, unit_words
 
-__all__ = [
-    "ColumnName",
-    "clocks_with_unit",
-    "parse_axes",
-    "parse_column_option",
-    "read_name",
-    "split_brackets",
-]
-
-
 _AXES = "xyz"
 #: A column of an array: its name and its number.
 INDEXED = re.compile(r"(.*)\[(\d+)\]")

@@ -26,9 +26,6 @@ from strapdown.formats.join import join
 from strapdown.formats.recording import NoStreamError, RawLog, TruthInSensorAxes
 from strapdown.formats.signs import Signs
 
-__all__ = ["belongs", "detect", "files_of", "read", "read_fixes"]
-
-
 Array = NDArray[np.float64]
 
 POSES = ("global_pose", "global_pos")

@@ -33,8 +33,6 @@ from strapdown.formats.crash_samples import Clock, seconds_of
 from strapdown.formats.crash_table import MOST_REMARKS, NOTE, ChannelName, channel_name
 from strapdown.units import FACTORS, OF_CRASHES, SPEEDS, TIME_UNITS, find_unit, unit_words
 
-__all__ = ["DELTA_V_RANGE", "KMH", "detect", "element_of", "read", "rounding"]
-
 Array = NDArray[np.float64]
 
 KMH = SPEEDS["km/h"]

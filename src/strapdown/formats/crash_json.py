@@ -24,8 +24,6 @@ from strapdown.formats.signs import Signs
 
 Array = NDArray[np.float64]
 
-__all__ = ["detect", "read", "write_crash_json"]
-
 FORMAT = "strapdown crash record"
 VERSION = 1
 LARGEST = 1_000_000_000

@@ -29,9 +29,6 @@ from strapdown.formats.nhtsa import KINDS, Channel, CrashTest, Vehicle, read_nht
 from strapdown.tables import imu_table
 from strapdown.units import find_unit, si_of
 
-__all__ = ["accelerations", "code_of_place", "imu_of", "read"]
-
-
 Array = NDArray[np.float64]
 
 _CODES = tomllib.loads(Path(__file__).with_name("nhtsa_codes.toml").read_text(encoding="utf-8"))

@@ -16,23 +16,6 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.tables import SAMPLINGS
 
-__all__ = [
-    "CHANGE_NOTE",
-    "DEFORMS",
-    "LONGEST_NAME",
-    "LONGEST_TEXT",
-    "QUANTITIES",
-    "CrashChannel",
-    "CrashRecord",
-    "attributes_of",
-    "check_attributes",
-    "clean",
-    "compact",
-    "position_of",
-    "unique",
-]
-
-
 Array = NDArray[np.float64]
 
 

@@ -16,17 +16,6 @@ from strapdown.formats.crash_record import CrashRecord, clean
 from strapdown.formats.crash_table import record_of
 from strapdown.formats.signs import Signs
 
-__all__ = [
-    "CRASH_READERS",
-    "CrashReader",
-    "detect",
-    "files_named",
-    "read",
-    "read_crash_record",
-    "stated_format",
-]
-
-
 # Logs of inertial sensors as crash records: arrays, phones, MATLAB, HDF5.
 
 

@@ -16,18 +16,6 @@ from strapdown.formats.inference.conclusion import infer_time_unit
 from strapdown.formats.triad_units import what_numbers_say
 from strapdown.units import TIME_UNITS
 
-__all__ = [
-    "Clock",
-    "last_midnight",
-    "mean_acceleration",
-    "mean_accelerations_of",
-    "means_from_zero",
-    "of_start",
-    "past_midnight",
-    "seconds_of",
-]
-
-
 Array = NDArray[np.float64]
 
 DAY = 86_400.0  # s

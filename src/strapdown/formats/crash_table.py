@@ -34,18 +34,6 @@ from strapdown.formats.recording import RawLog
 from strapdown.formats.vocabularies import CRASHES
 from strapdown.units import FACTORS, OF_CRASHES, find_unit
 
-__all__ = [
-    "NOTE",
-    "ChannelName",
-    "channel_name",
-    "notes_of",
-    "read",
-    "read_text_table",
-    "record_of",
-    "write_crash_csv",
-]
-
-
 Array = NDArray[np.float64]
 T = TypeVar("T")
 

@@ -27,9 +27,6 @@ from strapdown.units import FACTORS, OF_CRASHES, TIME_UNITS, find_unit
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["state_unit", "triad_factor", "triad_of_channels", "triad_stamps"]
-
-
 Array = NDArray[np.float64]
 
 _COLUMNS = {"acceleration": ACCEL, "rate": GYRO}

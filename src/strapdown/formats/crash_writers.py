@@ -36,17 +36,6 @@ from strapdown.formats.mme_reader import (
 from strapdown.tables import ACCEL, EULER, GYRO, NED, POSITION_SD, VELOCITY
 from strapdown.units import GYRO_UNITS, si_of
 
-__all__ = [
-    "ACCEL_HEADINGS",
-    "GYRO_HEADINGS",
-    "TIME",
-    "write_mme",
-    "write_nhtsa",
-    "write_path_csv",
-    "write_recorder_csv",
-]
-
-
 Array = NDArray[np.float64]
 
 NOVALUE = "NOVALUE"

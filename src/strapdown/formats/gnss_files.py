@@ -22,8 +22,10 @@ from strapdown.formats.gnss_fixes import (
     RADIUS,
     UNSTATED_VERTICAL,
     Fixes,
-    GnssOptions,
     table_of_fixes,
+)
+from strapdown.formats.gnss_fixes import (
+    GnssOptions as GnssOptions,
 )
 from strapdown.formats.gnss_pos import QUALITY
 from strapdown.formats.recording import RawLog
@@ -32,14 +34,6 @@ from strapdown.formats.vocabularies import FIXES
 from strapdown.frames import geodetic_from_ecef, geodetic_from_ned
 from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD
 from strapdown.units import OF_TABLES, SPEEDS, TIME_UNITS, unit_of
-
-__all__ = [
-    "GnssOptions",
-    "fixes_of_columns",
-    "open_fixes",
-    "read_gnss",
-]
-
 
 # GNSS fixes from tables with column names: text, Parquet.
 

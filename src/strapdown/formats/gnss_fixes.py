@@ -15,8 +15,6 @@ from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
 from strapdown.tables import gnss_table
 from strapdown.tables.checks import GEODETIC, HEIGHTS_AS_STATED, POSITION_SD, VELOCITY, VELOCITY_SD
 
-__all__ = ["Fixes", "GnssOptions", "table_of_fixes"]
-
 Array = NDArray[np.float64]
 Sd = float | tuple[float, float, float]
 

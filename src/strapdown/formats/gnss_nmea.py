@@ -35,8 +35,6 @@ from strapdown.formats.writing import (
 from strapdown.tables.checks import POSITION_SD, values_of
 from strapdown.units import SPEEDS
 
-__all__ = ["detect", "read", "write"]
-
 _SENTENCE = re.compile(r"\$([A-Z]{2})([A-Z]{3}),([^*]*)\*([0-9A-Fa-f]{2})\s*$")
 _DAY = 86400.0
 _KNOT = SPEEDS["kn"]

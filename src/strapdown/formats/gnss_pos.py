@@ -25,8 +25,6 @@ from strapdown.formats.signs import Signs
 from strapdown.formats.text_columns import columns_at_once
 from strapdown.frames import geodetic_from_ecef, q_ne
 
-__all__ = ["QUALITY", "detect", "read"]
-
 Array = NDArray[np.float64]
 #: Receivers of Emlid write it with the second ending, and without a line of names.
 SUFFIXES = (".pos", ".llh")

@@ -16,8 +16,6 @@ from strapdown.formats.columns import read_name
 from strapdown.formats.known_formats import selected
 from strapdown.formats.recording import RawLog
 
-__all__ = ["of_one_sensor"]
-
 #: Names of the column that tells sensors apart, without signs and blanks, in lower case.
 _NAMES = {
     *("i", "id", "instance", "imu", "imuid", "sensor", "sensorid", "sensorindex", "sensornumber"),

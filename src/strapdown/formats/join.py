@@ -20,8 +20,6 @@ from strapdown.formats.vocabularies import QUANTITIES
 from strapdown.tables import find_gaps
 from strapdown.units import TIME_UNITS
 
-__all__ = ["at_stamps", "clock_of", "in_seconds", "join", "known_only", "with_columns"]
-
 Array = NDArray[np.float64]
 AXES = "xyz"
 TRIADS = ("accel", "mag")

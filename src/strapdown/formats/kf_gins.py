@@ -37,26 +37,6 @@ from strapdown.formats.writing import (
 from strapdown.tables import ACCEL, GYRO, TRAJECTORY, check_trajectory, trajectory_table
 from strapdown.tables.checks import MAG, POSITION_SD, VELOCITY_SD, index_of, values_of
 
-__all__ = [
-    "COLUMNS",
-    "FOLDER_TITLE",
-    "detect",
-    "detect_fixes",
-    "detect_folder",
-    "detect_trajectory",
-    "files_of_folder",
-    "read",
-    "read_fixes",
-    "read_folder",
-    "read_folder_fixes",
-    "read_folder_trajectory",
-    "read_trajectory",
-    "write",
-    "write_dated_nav",
-    "write_nav",
-]
-
-
 Array = NDArray[np.float64]
 COLUMNS = ["time", *(f"dtheta_{a}" for a in "xyz"), *(f"dv_{a}" for a in "xyz")]
 SUFFIXES = (*csv.SUFFIXES, ".imu")

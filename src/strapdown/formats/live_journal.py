@@ -48,26 +48,6 @@ from strapdown.formats.signs import Signs, first_bytes
 from strapdown.tables import GEODETIC, GNSS, VELOCITY
 from strapdown.tables.checks import POSITION_SD, VELOCITY_SD
 
-__all__ = [
-    "EVENT",
-    "FRAME",
-    "JOURNAL",
-    "MAGIC",
-    "MEASURED",
-    "ROWS",
-    "RUN",
-    "SAMPLE",
-    "SCHEMA",
-    "WORD",
-    "event_payload",
-    "event_streams",
-    "events_in",
-    "fixes_of",
-    "records",
-    "run_of",
-    "session_folder",
-]
-
 Array = NDArray[np.float64]
 
 JOURNAL, RUN = "journal", "run.json"

@@ -29,19 +29,6 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, printable
 
-__all__ = [
-    "LARGEST_TILE",
-    "NORTHERNMOST",
-    "ChosenTiles",
-    "MapBox",
-    "MapFile",
-    "Tile",
-    "TileFolder",
-    "chosen_tiles",
-    "open_map",
-    "write_tiles",
-]
-
 #: Largest tile, bytes; least and largest side, pixels.
 LARGEST_TILE, SIDES = 1 << 20, (64, 1024)
 #: Characters of a name or an attribution that are shown.

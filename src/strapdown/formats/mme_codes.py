@@ -16,9 +16,6 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["DIMENSIONS", "DUMMIES", "FILTERS", "LENGTH", "NO_CLASS", "MmeCode", "decode_mme"]
-
-
 LENGTH = 16
 #: Letter of a channel without a filter class.
 NO_CLASS = "X"

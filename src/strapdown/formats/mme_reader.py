@@ -29,23 +29,6 @@ from strapdown.formats.mme_codes import DIMENSIONS, DUMMIES, NO_CLASS, MmeCode, 
 from strapdown.tables import SAMPLINGS
 from strapdown.units import FACTORS, OF_CRASHES, TIME_UNITS, find_unit
 
-__all__ = [
-    "MmeFile",
-    "MmeHeader",
-    "channel_of",
-    "clock_of",
-    "even_stamps",
-    "is_bad",
-    "read",
-    "read_header",
-    "read_mme_file",
-    "read_number",
-    "read_samples",
-    "stamps_of",
-    "text_of",
-]
-
-
 MOST_FILES = 20_000
 _NUMBERED = re.compile(r"\.(\d{3,4})$")
 _LISTED = re.compile(r"name of channel (\d+)")

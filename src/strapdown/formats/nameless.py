@@ -9,8 +9,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["rates_and_force"]
-
 Array = NDArray[np.float64]
 
 #: Most columns and samples that are compared; samples of one change of the force: of seconds, in

@@ -20,9 +20,6 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats.crash_record import header_of
 from strapdown.units import FACTORS, SPEEDS, TIME_UNITS, find_unit, si_of
 
-__all__ = ["Channel", "CrashTest", "Vehicle", "read_nhtsa"]
-
-
 TEST_FIELDS, CHANNEL_FIELDS, VEHICLE_FIELDS = 20, 20, 42
 MM = 1e-3
 

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from strapdown.formats.columns import read_name
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, unit_of
 
-__all__ = ["stated_by_keys", "stated_rate", "stated_units"]
-
 _META = re.compile(r"(?:[#%]|//)\s*(\w+)\s*:\s*(.+?)\s*$")
 # "Sample Rate:,128,Hz", "// Update Rate: 100.0Hz", "Sampling frequency (Hz): 50", "ODR 100 Hz".
 _RATES = (

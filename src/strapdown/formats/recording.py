@@ -20,18 +20,6 @@ from strapdown.tables import SAMPLINGS
 
 Array = NDArray[np.float64]
 
-__all__ = [
-    "NoStreamError",
-    "Origin",
-    "RawLog",
-    "ReadOptions",
-    "Reading",
-    "Recording",
-    "StatedStart",
-    "TruthInSensorAxes",
-]
-
-
 #: Codes that say that a recording does not have a stream, which is not a fault.
 ABSENT = {
     "io.no-stream",

@@ -28,9 +28,6 @@ from strapdown.formats.vocabularies import WITHOUT_GRAVITY
 from strapdown.parsers import parse
 from strapdown.units import TIME_UNITS
 
-__all__ = ["Member", "is_container", "members_of", "peek"]
-
-
 _TRIADS = {"gyro": "gyro", "accel": "accel", "mag": "mag", "magnetometer": "mag"}
 #: Words of a table that has no gravity, or that its device did not correct.
 _NOT_A_TRIAD = {*WITHOUT_GRAVITY, "gravity", "uncalibrated"}

@@ -17,22 +17,6 @@ from typing import NamedTuple
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.stamp_gate import StampGate
 
-__all__ = [
-    "ACCEL",
-    "FIX",
-    "GRAVITY",
-    "GYRO",
-    "LINEAR",
-    "MAG",
-    "PRESSURE",
-    "WIDTHS",
-    "Event",
-    "Joined",
-    "Located",
-    "SensorStreams",
-    "is_event",
-]
-
 #: Kinds of events, and their numbers of values: rad/s; m/s² with gravity, without it, and gravity
 #: alone, of the sign of specific force; µT; latitude and longitude (deg), height over the ellipsoid
 #: (m), speed and its standard deviation (m/s), course (deg), horizontal and vertical accuracy (m),

@@ -11,8 +11,6 @@ from collections.abc import Sequence
 
 from strapdown.units import unit_of
 
-__all__ = ["one_line_a_sample", "with_names"]
-
 Lines = list[tuple[int, str]]
 
 #: Most lines of a sample, lines in which turns are searched, and the longest that is understood.

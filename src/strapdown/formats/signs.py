@@ -15,8 +15,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-__all__ = ["HEAD", "Signs", "first_bytes", "head", "state_of"]
-
 #: Bytes of a file that are looked at.
 HEAD = 1 << 16
 

@@ -14,8 +14,6 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-__all__ = ["StampGate"]
-
 T = TypeVar("T")
 
 #: A longer step is not a step of a sensor: held samples further apart do not confirm each other, s.

@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 
 from strapdown.tables import on_disk
 
-__all__ = ["NULLS", "Columns", "columns_at_once", "parsed", "single_blanks"]
-
 Columns = list[NDArray[Any]]
 #: Texts of missing values.
 NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")

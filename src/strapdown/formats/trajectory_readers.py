@@ -22,13 +22,6 @@ from strapdown.rotation import within_half_turn
 from strapdown.tables import EULER, VELOCITY, trajectory_table
 from strapdown.tables.checks import HEIGHTS_AS_STATED
 
-__all__ = [
-    "find_trajectory_columns",
-    "judge_trajectory",
-    "read_trajectory",
-]
-
-
 Array = NDArray[np.float64]
 
 

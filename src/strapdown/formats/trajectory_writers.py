@@ -41,22 +41,6 @@ from strapdown.tables import (
 )
 from strapdown.tables.on_disk import let_go, parts_of
 
-__all__ = [
-    "DECIMALS",
-    "Thinned",
-    "cut_at_date_line",
-    "named_columns",
-    "one_line",
-    "thin",
-    "told_of",
-    "write_csv",
-    "write_decimals",
-    "write_error_csv",
-    "write_geojson",
-    "write_kml",
-    "write_parquet",
-]
-
 #: Decimals of time, latitude, longitude, height, velocity and attitude, for fixed digits.
 DECIMALS = (9, 11, 11, 6, 8, 8, 8, 9, 9, 9)
 

@@ -30,23 +30,6 @@ from strapdown.units import (
     parse_unit,
 )
 
-__all__ = [
-    "OPEN",
-    "SUMS",
-    "Axes",
-    "axes_matrix",
-    "body_axes",
-    "intervals",
-    "left_out",
-    "mirrored",
-    "sampling_of_sums",
-    "sum_of",
-    "told_by_numbers",
-    "unit_of_counts",
-    "units_of_triads",
-    "values_of_triads",
-]
-
 Array = NDArray[np.float64]
 
 

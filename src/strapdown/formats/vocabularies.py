@@ -21,17 +21,6 @@ from strapdown.units import (
     TIME_UNITS,
 )
 
-__all__ = [
-    "APPLE",
-    "CRASHES",
-    "FIXES",
-    "LOGS",
-    "QUANTITIES",
-    "TRAJECTORIES",
-    "Quantity",
-    "Vocabulary",
-]
-
 
 @dataclass(frozen=True)
 class Quantity:

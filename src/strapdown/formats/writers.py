@@ -44,7 +44,9 @@ from strapdown.formats.trajectory_writers import (
     write_parquet,
 )
 from strapdown.formats.writing import (
-    FileOptions,
+    FileOptions as FileOptions,
+)
+from strapdown.formats.writing import (
     Tables,
     decimal_seconds,
     is_trajectory,
@@ -72,21 +74,6 @@ from strapdown.tables.checks import (
     VELOCITY,
     VELOCITY_SD,
 )
-
-__all__ = [
-    "LOG_FORMATS",
-    "TRAJECTORY_FORMATS",
-    "WRITERS",
-    "FileOptions",
-    "Writer",
-    "find_writer",
-    "imu_columns",
-    "log_formats",
-    "table_columns",
-    "write_attitude_csv",
-    "write_streams",
-    "write_trajectory",
-]
 
 Array = NDArray[Any]
 AXES = "forward-right-down"

@@ -37,21 +37,6 @@ from strapdown.tables.checks import (
     values_of,
 )
 
-__all__ = [
-    "FLU",
-    "TUM_FRAMES",
-    "FileOptions",
-    "Tables",
-    "accel_needed",
-    "dates",
-    "dates_if_known",
-    "fixes_of",
-    "gps_ns",
-    "not_held",
-    "unix_ns",
-    "write_numbers",
-]
-
 #: Axes of a TUM file: name to (world axes, body axes).
 TUM_FRAMES = {
     "enu": ("east, north, up at the origin", "forward, left, up"),

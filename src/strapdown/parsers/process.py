@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 if sys.platform == "linux":
     import fcntl
 
-__all__ = ["in_place", "parse", "start", "start_for"]
-
 #: Endings of files that are parsed elsewhere.
 ENDINGS = (
     *(".h5", ".hdf5", ".hdf", ".mat", ".npz", ".zip", ".xlsx", ".xlsm"),

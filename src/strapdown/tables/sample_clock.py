@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from strapdown.dsp.samples import moving_mean
 from strapdown.tables.checks import Gap, find_gaps
 
-__all__ = ["SampleClock", "ends_of_part", "sample_clock"]
-
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 

@@ -15,9 +15,6 @@ from strapdown.errors import Finding
 from strapdown.tables.on_disk import filled, let_go, stored
 from strapdown.units import TIME_UNITS
 
-__all__ = ["THRESHOLD", "Inference", "conclude", "differenced", "evidence", "posterior"]
-
-
 K = TypeVar("K", bound=Hashable)
 
 #: Below this probability the user is asked. A wrong unit spoils a whole run while a question costs
