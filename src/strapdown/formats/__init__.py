@@ -452,17 +452,9 @@ def read_raw(path: str | Path, form: str | None = None) -> RawLog:
 class Foreign:
     """A format that is known and not read.
 
-    Attributes
-    ----------
-    what : str
-    way : str
-        How its content gets in: program, or the export of the maker's program.
-    magics : tuple of bytes
-        First bytes; empty if the ending alone identifies the format.
-    suffixes : tuple of str
-        Endings; if `magics` are given, empty for any.
-    offset : int
-        Where the first bytes are.
+    `way`: how its content gets in: program, or the export of the maker's program. `magics`: first
+    bytes; empty if the ending alone identifies the format. `suffixes`: endings; if `magics` are
+    given, empty for any. `offset`: where the first bytes are.
     """
 
     what: str

@@ -198,10 +198,7 @@ def _advance(stamps: list[float]) -> bool:
 def read(path: Path) -> RawLog:
     """Read the gyro, with the other sensors interpolated to its stamps.
 
-    Raises
-    ------
-    DataError
-        A row has too few fields, or a value is not a number.
+    DataError: a row has too few fields, or a value is not a number.
     """
     text, findings = csv.decoded(path.read_bytes(), path.name)
     layout = _layout(text[: 1 << 16])

@@ -85,21 +85,9 @@ detect = Signs(
 def read(path: Path) -> RawLog:
     """Read rates and specific force; from a folder, with the attitude truth beside them.
 
-    Parameters
-    ----------
-    path : Path
-        ``data.csv`` of a sensor or of a ground truth; or the folder ``mav0``, ``imu0``, or the
-        parent of ``mav0``.
-
-    Returns
-    -------
-    RawLog
-        For a ground truth alone, stamps and the attitude.
-
-    Raises
-    ------
-    DataError
-        A table is damaged.
+    `path`: ``data.csv`` of a sensor or of a ground truth; or the folder ``mav0``, ``imu0``, or the
+    parent of ``mav0``. For a ground truth alone, stamps and the attitude. DataError: a table is
+    damaged.
     """
     if path.is_dir():
         return _folder(path)

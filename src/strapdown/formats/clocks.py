@@ -75,11 +75,7 @@ _MODERN = 1e9  # s
 class Clock:
     """Clock of a table's time; see the module.
 
-    Attributes
-    ----------
-    name : str
-    origin : float, s
-    week : int or None
+    `origin` (s).
     """
 
     name: str
@@ -315,14 +311,8 @@ OFF_TICK = 0.1
 class EvenStamps:
     """Stamps at a constant rate that fit those of a clock with coarse ticks.
 
-    Attributes
-    ----------
-    ticks : ndarray, (n,)
-        In the unit of the stamps.
-    tick, step : float
-        Tick of the clock and step of the samples, in the unit of the stamps.
-    off : float
-        Largest distance of a stamp from its tick.
+    `ticks` ((n,)): in the unit of the stamps. `tick`, `step`: tick of the clock and step of the
+    samples, in the unit of the stamps. `off`: largest distance of a stamp from its tick.
     """
 
     ticks: NDArray[Any]
@@ -380,14 +370,9 @@ def even_stamps(stamps: NDArray[Any]) -> EvenStamps | None:
 class SpreadBursts:
     """Stamps of samples that share one by one burst, spread over an even clock.
 
-    Attributes
-    ----------
-    ticks : ndarray, (n,)
-        In the unit of the stamps.
-    step, spread : float
-        Step of the samples, and standard deviation of the deliveries, in the unit of the stamps.
-    size : float
-        Mean number of samples of a burst.
+    `ticks` ((n,)): in the unit of the stamps. `step`, `spread`: step of the samples, and standard
+    deviation of the deliveries, in the unit of the stamps. `size`: mean number of samples of a
+    burst.
     """
 
     ticks: NDArray[Any]
@@ -443,17 +428,8 @@ EPOCH = 1e6  # s
 class Stamps:
     """Stamps in seconds, with findings.
 
-    Attributes
-    ----------
-    seconds : ndarray, (n,)
-    unit : str
-    why : str
-        Reason for the unit.
-    keep : ndarray of bool, (n,)
-        Rows that remain when those with faulty stamps are dropped.
-    origin : Origin
-        The raw stamp at time zero.
-    findings : list of Finding
+    `seconds` ((n,)). `why`: reason for the unit. `keep` ((n,)): rows that remain when those with
+    faulty stamps are dropped. `origin`: the raw stamp at time zero.
     """
 
     seconds: Array

@@ -50,20 +50,9 @@ detect = Signs(folder=_has_arrays)
 def read(path: Path) -> RawLog:
     """Read gyro, accelerometer, magnetometer and, if present, the pose as truth.
 
-    Parameters
-    ----------
-    path : Path
-        The folder of a segment, its ``processed_log``, or the folder of the arrays.
-
-    Returns
-    -------
-    RawLog
-        The truth is at the gyro sample nearest to each camera frame.
-
-    Raises
-    ------
-    DataError
-        An array is damaged or has the wrong shape.
+    `path`: the folder of a segment, its ``processed_log``, or the folder of the arrays. The truth
+    is at the gyro sample nearest to each camera frame. DataError: an array is damaged or has the
+    wrong shape.
     """
     name = path.resolve().name
     logs, files = [], []

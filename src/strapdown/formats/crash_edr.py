@@ -507,16 +507,9 @@ def _groups(tables: list[_Table], crash: list[int]) -> list[list[int]]:
 def read(path: Path) -> CrashRecord:
     """Read the tables of an event data recorder.
 
-    Returns
-    -------
-    CrashRecord
-        A channel for each column, under its heading; of the tables of one event the same `event`.
-        Columns of one quantity in two units are one channel where they agree within their rounding.
-
-    Raises
-    ------
-    DataError
-        The text holds no such table, or its stamps do not advance.
+    A channel for each column, under its heading; of the tables of one event the same `event`.
+    Columns of one quantity in two units are one channel where they agree within their rounding.
+    DataError: the text holds no such table, or its stamps do not advance.
     """
     text, findings = csv.decoded(path.read_bytes(), path.name)
     found = _tables(text)

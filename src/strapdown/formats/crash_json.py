@@ -85,10 +85,7 @@ detect = Signs(first=rb"\A\s*+\{.{0,180}?" + FORMAT.encode())
 def read(path: Path) -> CrashRecord:
     """Read a record written as JSON.
 
-    Raises
-    ------
-    DataError
-        The file is truncated, or has another structure.
+    DataError: the file is truncated, or has another structure.
     """
     whole = _parsed(path)
     stamps = [

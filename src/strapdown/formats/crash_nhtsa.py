@@ -57,15 +57,7 @@ _STATUS = _CODES["status"]
 def read(path: Path) -> CrashRecord:
     """Read a test; samples are read when a channel is used.
 
-    Parameters
-    ----------
-    path : Path
-        The header, or its folder.
-
-    Returns
-    -------
-    CrashRecord
-        With the channels whose files exist.
+    `path`: the header, or its folder. With the channels whose files exist.
     """
     test = read_nhtsa(path)
     there = [c for c in test.channels if c.path is not None]

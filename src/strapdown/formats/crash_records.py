@@ -42,10 +42,7 @@ def detect(path: Path) -> bool:
 def read(path: Path) -> CrashRecord:
     """Read a log of another format.
 
-    Raises
-    ------
-    DataError
-        The file is damaged, or of none of these formats.
+    DataError: the file is damaged, or of none of these formats.
     """
     from strapdown.formats import READERS, read_raw
 

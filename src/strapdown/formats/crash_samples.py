@@ -25,17 +25,8 @@ DAY = 86_400.0  # s
 class Clock:
     """A column of stamps, as recorded.
 
-    Attributes
-    ----------
-    name : str
-        Name of the column.
-    stamps : ndarray, (n,)
-        Integer or not, as recorded.
-    unit : str
-        A key of `TIME_UNITS`, or empty if not stated.
-    file : str
-    row : callable
-        Maps the number of a stamp to its row in the file.
+    `name`: name of the column. `stamps` ((n,)): integer or not, as recorded. `unit`: a key of
+    `TIME_UNITS`, or empty if not stated. `row`: maps the number of a stamp to its row in the file.
     """
 
     name: str

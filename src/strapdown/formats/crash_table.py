@@ -51,18 +51,10 @@ _OF_TRIAD = {"gyro": "rate", "accel": "acceleration", "mag": "other"}
 class ChannelName:
     """Content of a column name.
 
-    Attributes
-    ----------
-    quantity : str
-        A key of `crash_record.QUANTITIES`.
-    axis : str
-        ``x y z``, with a minus if the name states it, or empty.
-    unit : str
-        In the spelling of this package, as in the name if unknown, or empty.
-    change : bool
-        For a velocity: the name states a change since time zero.
-    contradiction : str
-        Part of the name that contradicts the unit, or empty.
+    `quantity`: a key of `crash_record.QUANTITIES`. `axis`: ``x y z``, with a minus if the name
+    states it, or empty. `unit`: in the spelling of this package, as in the name if unknown, or
+    empty. `change`: for a velocity: the name states a change since time zero. `contradiction`: part
+    of the name that contradicts the unit, or empty.
     """
 
     quantity: str
@@ -75,15 +67,8 @@ class ChannelName:
 def read(path: Path) -> CrashRecord:
     """Read a text table.
 
-    Returns
-    -------
-    CrashRecord
-        One channel for each numeric column, under its name.
-
-    Raises
-    ------
-    DataError
-        The file is not a table, or is damaged.
+    One channel for each numeric column, under its name. DataError: the file is not a table, or is
+    damaged.
     """
     raw, notes, title, remarks = read_text_table(path)
     return record_of(raw, path, "csv", notes=notes, title=title, remarks=remarks)
@@ -100,19 +85,8 @@ def record_of(
 ) -> CrashRecord:
     """Make a record from the columns of a log.
 
-    Parameters
-    ----------
-    form : str
-        Key of the format.
-    notes : dict of str to dict, optional
-        Metadata of columns stated in the file, as from `attributes_of`.
-    remarks : tuple of str, optional
-        Lines above the table.
-
-    Raises
-    ------
-    DataError
-        No column is numeric.
+    `form`: key of the format. `notes`: metadata of columns stated in the file, as from
+    `attributes_of`. `remarks`: lines above the table. DataError: no column is numeric.
     """
     findings = list(raw.findings)
     kept: list[str] = []

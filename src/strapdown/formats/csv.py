@@ -79,17 +79,9 @@ detect = Signs(named=SUFFIXES, also=_begins_with_rows)
 def read(path: Path) -> RawLog:
     """Read the columns of a text table.
 
-    Returns
-    -------
-    RawLog
-        Columns that hold anything but numbers are left as text. Lines at the top that begin
-        with ``#``, ``%``, ``//``, ``!`` or ``;`` are comments; the comment ``# sampling: mean`` is
-        understood.
-
-    Raises
-    ------
-    DataError
-        The file is empty, holds only a header, or is not text.
+    Columns that hold anything but numbers are left as text. Lines at the top that begin with ``#``,
+    ``%``, ``//``, ``!`` or ``;`` are comments; the comment ``# sampling: mean`` is understood.
+    DataError: the file is empty, holds only a header, or is not text.
     """
     files = (path,)
     return _at_once(path, path.name, files) or _line_by_line(path.read_bytes(), path.name, files)
@@ -330,15 +322,8 @@ class _Top:
     Lines above the names are a preamble. Two lines of names are a group and its members, as
     ``Gyroscope,,`` over ``x,y,z``.
 
-    Parameters
-    ----------
-    numbered : list of (int, str)
-        Lines with their rows, without the comments at the top.
-    comments : list of str
-    name : str
-        For messages.
-    kinds : sequence of str
-        Kinds of units that a row under the names may have.
+    `numbered`: lines with their rows, without the comments at the top. `name`: for messages.
+    `kinds`: kinds of units that a row under the names may have.
     """
 
     def __init__(

@@ -38,16 +38,9 @@ detect_broad = Signs(suffixes=hdf5.SUFFIXES, also=_has_trial)
 def read_broad(path: Path) -> RawLog:
     """Read a trial: sensor, optical attitude, and the samples that are scored.
 
-    Returns
-    -------
-    RawLog
-        Sensor axes are taken as forward, left, up. The truth is rotated alike, so that
-        error angles do not depend on this choice.
-
-    Raises
-    ------
-    DataError
-        The file is damaged, or a dataset differs in length from the gyro's.
+    Sensor axes are taken as forward, left, up. The truth is rotated alike, so that error angles do
+    not depend on this choice. DataError: the file is damaged, or a dataset differs in length from
+    the gyro's.
     """
     arrays, _, meta = hdf5.read_arrays(path)
     shapes = {n: arrays.get(n, np.empty(0)).shape for n in ("imu_gyr", "imu_acc", "opt_quat")}
@@ -107,10 +100,7 @@ detect_ronin = Signs(suffixes=hdf5.SUFFIXES, also=_has_datasets)
 def read_ronin(path: Path) -> RawLog:
     """Read rates, specific force and, if present, the magnetic field.
 
-    Raises
-    ------
-    DataError
-        The file is damaged, or an array has the wrong shape.
+    DataError: the file is damaged, or an array has the wrong shape.
     """
     arrays, _, _ = hdf5.read_arrays(path, (TIME, *TRIADS))
     for name in (TIME, GYRO, FORCE):
@@ -173,21 +163,8 @@ detect_mpu = Signs(folder=_has_gyro)
 def read_mpu(path: Path) -> RawLog:
     """Read the gyro, and the accelerometer if there is one.
 
-    Parameters
-    ----------
-    path : Path
-        The folder.
-
-    Returns
-    -------
-    RawLog
-        An accelerometer with its own stamps is interpolated to those of the gyro. The unused
-        tail of a buffer is dropped.
-
-    Raises
-    ------
-    DataError
-        A file is damaged or has another layout.
+    An accelerometer with its own stamps is interpolated to those of the gyro.
+    The unused tail of a buffer is dropped. DataError: a file is damaged or has another layout.
     """
     findings: list[Finding] = []
     gyro = _buffer(path / GYRO_FILE, "gyroBuffer", findings)
@@ -279,10 +256,7 @@ detect_smartloc = Signs(text=r"\A" + "".join(f"(?=.*{re.escape(n)})" for n in (*
 def read_smartloc(path: Path) -> RawLog:
     """Read position and velocity of the reference, once an epoch.
 
-    Raises
-    ------
-    DataError
-        A column is missing, or a value is not a number.
+    DataError: a column is missing, or a value is not a number.
     """
     raw = under(path)
     heading = next((n for n in raw.columns if n.startswith("Heading (0° = East, counterc")), "")
@@ -365,10 +339,7 @@ def _log(path: Path) -> tuple[Array, Array]:
 def read_foot(path: Path) -> RawLog:
     """Read rates and specific force.
 
-    Raises
-    ------
-    DataError
-        The file is damaged, or its arrays have the wrong shapes.
+    DataError: the file is damaged, or its arrays have the wrong shapes.
     """
     time, imu = _log(path)
     units = {"gyro": "rad/s", "accel": "m/s2"}

@@ -45,12 +45,7 @@ _WHY: dict[Basis, str] = {
 class Column:
     """The column of a file that holds a quantity.
 
-    Attributes
-    ----------
-    source : str
-    unit : str or None
-    basis : {'name', 'file', 'option', 'numbers', 'open'}
-        What assigns it to the quantity.
+    `basis` ({'name', 'file', 'option', 'numbers', 'open'}): what assigns it to the quantity.
     """
 
     source: str
@@ -622,14 +617,8 @@ Array = NDArray[np.float64]
 class Found:
     """The column of a quantity.
 
-    Attributes
-    ----------
-    source : str
-        Column name in the file.
-    factor : float
-        Factor to the table's unit and sign.
-    stated : bool
-        Whether the name states the unit; otherwise the table's own is assumed.
+    `source`: column name in the file. `factor`: factor to the table's unit and sign. `stated`:
+    whether the name states the unit; otherwise the table's own is assumed.
     """
 
     source: str

@@ -492,25 +492,12 @@ def read_gnss(
 ) -> pd.DataFrame:
     """Read the fixes of a GNSS receiver.
 
-    Parameters
-    ----------
-    options : GnssOptions, optional
-        User's statements about the file.
-    raw : RawLog or Fixes, optional
-        Its stream of fixes, if it was opened before (`open_fixes`), which is used up.
-
-    Returns
-    -------
-    DataFrame
-        A Gnss table with the time of the file; ``attrs`` has the clock (`clocks`), ``source``
-        and ``findings``. A missing velocity has an infinite standard deviation.
-
-    Raises
-    ------
-    ConfigError
-        The file or format does not exist, or `options` names a column that it does not have.
-    DataError
-        The file cannot be used; the message names file, row, quantity and remedy.
+    `options`: user's statements about the file. `raw`: its stream of fixes, if it was opened before
+    (`open_fixes`), which is used up. A Gnss table with the time of the file; ``attrs`` has the
+    clock (`clocks`), ``source`` and ``findings``. A missing velocity has an infinite standard
+    deviation. ConfigError: the file or format does not exist, or `options` names a column that it
+    does not have. DataError: the file cannot be used; the message names file, row, quantity and
+    remedy.
     """
     path, asked = Path(path), options or GnssOptions()
     if path.is_file() and comma2k19.belongs(path):

@@ -93,16 +93,8 @@ def _is_fix_header(line: str) -> bool:
 def read(path: Path) -> RawLog:
     """Read gyro, accelerometer and magnetometer, joined on the stamps of the gyro.
 
-    Returns
-    -------
-    RawLog
-        Stamps in ns since 1970: the evenly advancing time since the phone's start, plus the
-        median offset of its wall clock.
-
-    Raises
-    ------
-    DataError
-        A line is damaged, or the log has no gyro.
+    Stamps in ns since 1970: the evenly advancing time since the phone's start, plus the median
+    offset of its wall clock. DataError: a line is damaged, or the log has no gyro.
     """
     findings: list[Finding] = []
     lines = _lines(path)

@@ -73,16 +73,9 @@ def rows_beside(path: Path) -> int:
 def read(path: Path) -> Fixes:
     """Read the fixes of NMEA sentences.
 
-    Returns
-    -------
-    Fixes
-        In seconds since 1970 if a date is stated, otherwise in seconds of the first day.
-        Sentences with a wrong checksum are dropped and counted.
-
-    Raises
-    ------
-    DataError
-        The file has no GGA, a field is not a number, or some GGA lack the geoid undulation.
+    In seconds since 1970 if a date is stated, otherwise in seconds of the first day. Sentences with
+    a wrong checksum are dropped and counted. DataError: the file has no GGA, a field is not a
+    number, or some GGA lack the geoid undulation.
     """
     text, findings = csv.decoded(path.read_bytes(), path.name)
     epochs: list[_Epoch] = []

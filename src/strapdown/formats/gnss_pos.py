@@ -65,17 +65,9 @@ class _Layout:
 def read(path: Path) -> Fixes:
     """Read the fixes of an RTKLIB solution.
 
-    Returns
-    -------
-    Fixes
-        Time in seconds of the GPS week of the first row: UTC is converted with its leap
-        seconds, JST with nine more hours.
-
-    Raises
-    ------
-    DataError
-        No line names the columns, and the rows are not as RTKLIB writes them; the solution is a
-        baseline, the datum is another, or a row is damaged.
+    Time in seconds of the GPS week of the first row: UTC is converted with its leap seconds, JST
+    with nine more hours. DataError: no line names the columns, and the rows are not as RTKLIB
+    writes them; the solution is a baseline, the datum is another, or a row is damaged.
     """
     text, findings = _decoded(path)
     lines = text.splitlines()

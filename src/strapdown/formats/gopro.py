@@ -88,10 +88,7 @@ detect = Signs(
 def read(path: Path) -> RawLog:
     """Read the gyro, with the accelerometer interpolated to its stamps.
 
-    Raises
-    ------
-    DataError
-        The file is damaged, or does not state its stamps or the order of its axes.
+    DataError: the file is damaged, or does not state its stamps or the order of its axes.
     """
     streams, clock = _streams(path)
     if "GYRO" not in streams:

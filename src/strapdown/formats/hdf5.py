@@ -31,15 +31,8 @@ detect = Signs(suffixes=SUFFIXES, also=_is_hdf5)
 def read(path: Path) -> RawLog:
     """Read the numeric datasets of an HDF5 file.
 
-    Returns
-    -------
-    RawLog
-        Datasets in groups are named ``group/dataset``.
-
-    Raises
-    ------
-    DataError
-        The file is not HDF5, is damaged, or declares more data than it holds.
+    Datasets in groups are named ``group/dataset``. DataError: the file is not HDF5, is damaged, or
+    declares more data than it holds.
     """
     arrays, units, meta = read_arrays(path)
     return raw_log(path, arrays, units, meta)

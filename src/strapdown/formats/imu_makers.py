@@ -281,10 +281,7 @@ def files_of_xio(path: Path) -> tuple[Path, ...]:
 def read_xio(path: Path) -> RawLog:
     """Read rates and specific force, without rows that repeat the one before.
 
-    Raises
-    ------
-    DataError
-        The table is damaged.
+    DataError: the table is damaged.
     """
     raw = under(path / TABLE if path.is_dir() else path)
     time = next(t for t in TIMES if t in raw.columns)
@@ -347,16 +344,8 @@ detect_xsens = Signs(text=f"{COUNTER}|{STAMP}", also=_has_names_of_xsens)
 def read_xsens(path: Path) -> RawLog:
     """Read rates and specific force, with stamps from the counters.
 
-    Returns
-    -------
-    RawLog
-        Stamps in µs of ``SampleTimeFine``; without it, of ``PacketCounter`` and the stated
-        rate.
-
-    Raises
-    ------
-    DataError
-        The file is damaged, or the tick of the clock is not known.
+    Stamps in µs of ``SampleTimeFine``; without it, of ``PacketCounter`` and the stated rate.
+    DataError: the file is damaged, or the tick of the clock is not known.
     """
     data = path.read_bytes()
     raw = csv.parse(data, path.name, (path,))

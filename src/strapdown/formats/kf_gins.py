@@ -91,16 +91,9 @@ detect = Signs(suffixes=SUFFIXES, first=rb"\A[^,\0]*\Z", also=_begins_with_incre
 def read(path: Path) -> RawLog:
     """Read increments of angle and velocity.
 
-    Returns
-    -------
-    RawLog
-        Columns `COLUMNS`, in s, rad, m/s. Axes forward, right, down if gravity is on the third
-        axis, downward; otherwise not stated.
-
-    Raises
-    ------
-    DataError
-        The file is not text, a row has another width, or the numbers are not increments.
+    Columns `COLUMNS`, in s, rad, m/s. Axes forward, right, down if gravity is on the third axis,
+    downward; otherwise not stated. DataError: the file is not text, a row has another width, or the
+    numbers are not increments.
     """
     raw = csv.read(path)
     names = list(raw.columns)

@@ -79,15 +79,8 @@ detect = Signs(folder=_has_samples)
 def read(path: Path) -> RawLog:
     """Read rates and specific force, with the attitude of the unit's own solution as truth.
 
-    Parameters
-    ----------
-    path : Path
-        The folder ``oxts``, or its parent, the folder of the drive.
-
-    Raises
-    ------
-    DataError
-        A file is missing or damaged.
+    `path`: the folder ``oxts``, or its parent, the folder of the drive. DataError: a file is
+    missing or damaged.
     """
     time, values, files = _values(path)
     if np.isnan(values[:, RATE]).all():

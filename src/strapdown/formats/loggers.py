@@ -63,10 +63,7 @@ detect_vbo = Signs(
 def read_vbo_fixes(path: Path) -> RawLog:
     """Read the fixes; rows without satellites are left out.
 
-    Raises
-    ------
-    DataError
-        A column of time or position is missing, or a section is empty.
+    DataError: a column of time or position is missing, or a section is empty.
     """
     lines = [line.strip() for line in _lines(path)]
     names = next((lines[k + 1] for k, n in enumerate(lines[:-1]) if n == "[column names]"), "")
@@ -186,10 +183,7 @@ detect_gyroflow = Signs(text=r"\A(?:GYROFLOW IMU LOG|CAMERA IMU LOG)")
 def read_gyroflow(path: Path) -> RawLog:
     """Read the samples in counts, with the values of a count.
 
-    Raises
-    ------
-    DataError
-        The names of the columns are missing.
+    DataError: the names of the columns are missing.
     """
     lines = _lines(path)
     begin = next((k for k, line in enumerate(lines) if re.match(r"t,gx,gy,gz\b", line)), None)

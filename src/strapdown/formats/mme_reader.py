@@ -38,15 +38,8 @@ _TITLES = ("title", "type of the test", "laboratory test ref. number", "test nam
 def read(path: Path) -> CrashRecord:
     """Read a test; samples are read when a channel is used.
 
-    Parameters
-    ----------
-    path : Path
-        The ``.mme`` file, or the folder that holds it.
-
-    Raises
-    ------
-    DataError
-        No header, several headers, no channel, or a damaged header.
+    `path`: the ``.mme`` file, or the folder that holds it. DataError: no header, several headers,
+    no channel, or a damaged header.
     """
     head = header_of(path, ".mme", "io.folder-holds-tests", "io.no-mme-file")
     header = read_header(head)
@@ -358,14 +351,8 @@ Array = NDArray[np.float64]
 class MmeFile:
     """One channel file.
 
-    Attributes
-    ----------
-    path : Path
-    header : MmeHeader
-    code : str
-        As given in the file or the index; empty if neither has one.
-    known : MmeCode or None
-        The decoded code, if valid.
+    `code`: as given in the file or the index; empty if neither has one. `known`: the decoded code,
+    if valid.
     """
 
     path: Path
@@ -650,17 +637,9 @@ _MISSING = ("novalue", "nan")
 class MmeHeader:
     """Lines of a header.
 
-    Attributes
-    ----------
-    file : str
-        For messages.
-    values : dict of str to (str, int)
-        Key in lower case with single blanks to its value and line; the first of repeated
-        keys.
-    more : dict of str to list of str
-        All values of each key.
-    end : int
-        Number of lines before the samples.
+    `file`: for messages. `values`: key in lower case with single blanks to its value and line; the
+    first of repeated keys. `more`: all values of each key. `end`: number of lines before the
+    samples.
     """
 
     file: str

@@ -28,22 +28,9 @@ MM = 1e-3
 class Vehicle:
     """A vehicle of a test, in SI units; NaN where not stated.
 
-    Attributes
-    ----------
-    number : int
-    year : int or None
-        None where not stated.
-    make, model, body : str
-        Codes of the database.
-    vin : str
-    mass : float, kg
-        As tested.
-    wheelbase, length, width : float, m
-    cg_behind_front_axle : float, m
-    speed : float, m/s
-        Before the impact.
-    crab_deg : float, deg
-        Between its heading and its direction of travel.
+    `year`: none where not stated. `make`, `model`, `body`: codes of the database. `mass`: as
+    tested. `wheelbase`, `length`, `width` (m). `cg_behind_front_axle` (m). `speed` (m/s): before
+    the impact. `crab_deg` (deg): between its heading and its direction of travel.
     """
 
     number: int

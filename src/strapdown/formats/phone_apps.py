@@ -72,10 +72,7 @@ def _named(names: list[str]) -> dict[str, str]:
 def read_core_motion(path: Path) -> RawLog:
     """Read the rates, and specific force from gravity and user acceleration.
 
-    Raises
-    ------
-    DataError
-        The table is damaged, or a value is not a number.
+    DataError: the table is damaged, or a value is not a number.
     """
     raw = under(path)
     named = _named(list(raw.columns))

@@ -134,12 +134,8 @@ STATED, INFERRED = "stated by the user", "inferred, not yet confirmed"
 class TruthInSensorAxes:
     """Attitude truth of a log, in sensor axes.
 
-    Attributes
-    ----------
-    q_ns : ndarray, (n, 4)
-        Sensor axes to local level north-east-down at each sample, NaN where unknown.
-    scored : ndarray of bool, (n,)
-        Samples that count for errors.
+    `q_ns` ((n, 4)): sensor axes to local level north-east-down at each sample, NaN where unknown.
+    `scored` ((n,)): samples that count for errors.
     """
 
     q_ns: Array
@@ -150,14 +146,9 @@ class TruthInSensorAxes:
 class StatedStart:
     """Initial state stated in a log; shown to people, not used by any reader.
 
-    Attributes
-    ----------
-    lat_deg, lon_deg : float, deg
-        Geodetic, north and east positive.
-    alt : float, m
-    roll_pitch_heading_deg : tuple of float, deg
-        Body forward-right-down to north-east-down.
-    velocity_ned : tuple of float, m/s
+    `lat_deg`, `lon_deg` (deg): geodetic, north and east positive. `alt` (m).
+    `roll_pitch_heading_deg` (deg): body forward-right-down to north-east-down. `velocity_ned`
+    (m/s).
     """
 
     lat_deg: float
@@ -260,13 +251,7 @@ class RawLog:
 
 @dataclass(frozen=True)
 class Origin:
-    """The raw stamp at time zero; zero itself if time was not shifted.
-
-    Attributes
-    ----------
-    stamp : int or float
-    unit : str
-    """
+    """The raw stamp at time zero; zero itself if time was not shifted."""
 
     stamp: int | float
     unit: str

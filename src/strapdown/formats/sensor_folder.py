@@ -54,15 +54,8 @@ detect = Signs(suffixes=(".zip",), also=_is_of_one_recording, folder=_has_gyro)
 def read(path: Path) -> RawLog:
     """Read each sensor's table, joined on the stamps of the gyro.
 
-    Returns
-    -------
-    RawLog
-        Columns named x, y, z belong to the sensor after which their table is named.
-
-    Raises
-    ------
-    DataError
-        The archive or a table is damaged, or the gyro is missing.
+    Columns named x, y, z belong to the sensor after which their table is named. DataError: the
+    archive or a table is damaged, or the gyro is missing.
     """
     name = path.resolve().name
     members = members_of(path)
@@ -137,15 +130,8 @@ MOST_TABLES = 200
 class Member:
     """A file of a folder, or a member of an archive.
 
-    Attributes
-    ----------
-    name : str
-        Path inside the folder or archive, with slashes.
-    label : str
-        Given path and name, for messages.
-    file : Path
-        The file on disk that holds it.
-    archived : bool
+    `name`: path inside the folder or archive, with slashes. `label`: given path and name, for
+    messages. `file`: the file on disk that holds it.
     """
 
     name: str
@@ -166,10 +152,7 @@ class Member:
     def read(self) -> bytes:
         """Read the whole content.
 
-        Raises
-        ------
-        DataError
-            The file cannot be read, or declares more data than is stored.
+        DataError: the file cannot be read, or declares more data than is stored.
         """
         return self._bytes(-1)
 

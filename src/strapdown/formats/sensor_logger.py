@@ -97,10 +97,7 @@ detect = Signs(
 def read(path: Path) -> RawLog:
     """Read gyro, specific force and magnetic field, joined on the stamps of the gyro.
 
-    Raises
-    ------
-    DataError
-        A file is damaged, or the gyroscope is missing.
+    DataError: a file is damaged, or the gyroscope is missing.
     """
     name = path.resolve().name
     sensors, meta, files, _ = _tables(path, SENSORS)

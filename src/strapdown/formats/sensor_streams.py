@@ -44,13 +44,8 @@ MOST = 1e9
 class Event(NamedTuple):
     """One sample of one sensor.
 
-    Attributes
-    ----------
-    kind : int
-    stamp : int, ns
-        By the clock of the device.
-    values : tuple of float
-        As many as `WIDTHS` says, axes of the device.
+    `stamp` (ns): by the clock of the device. `values`: as many as `WIDTHS` says, axes of the
+    device.
     """
 
     kind: int
@@ -61,14 +56,8 @@ class Event(NamedTuple):
 class Joined(NamedTuple):
     """Sample of all inertial sensors at a stamp of the gyro.
 
-    Attributes
-    ----------
-    time : float, s
-        From `SensorStreams.epoch`.
-    gyro, accel : tuple of float
-        rad/s and m/s², axes of the device.
-    mag : tuple of float, or None
-        µT; None where there is none.
+    `time` (s): from `SensorStreams.epoch`. `gyro`, `accel`: rad/s and m/s², axes of the device.
+    `mag`: µT; None where there is none.
     """
 
     time: float
@@ -127,19 +116,10 @@ class _Track:
 class SensorStreams:
     """Join the sensors of one device as their samples arrive.
 
-    Parameters
-    ----------
-    hold : float, s
-        By how much samples of a sensor may be late; each waits so long, by the stamps.
-
-    Attributes
-    ----------
-    epoch : int or None, s
-        Origin of `Joined.time`, on the clock of the device; None before the first sample.
-    unused : Counter
-        Events that were not used, by reason.
-    went_back : bool
-        Whether the clock of the device was set back: what follows belongs to another session.
+    `hold` (s): by how much samples of a sensor may be late; each waits so long, by the stamps.
+    `epoch` (s): origin of `Joined.time`, on the clock of the device; None before the first sample.
+    `unused`: events that were not used, by reason. `went_back`: whether the clock of the device was
+    set back: what follows belongs to another session.
     """
 
     def __init__(self, hold: float = 0.0) -> None:

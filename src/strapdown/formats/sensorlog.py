@@ -83,16 +83,9 @@ detect = Signs(text=r"\A\s*+.*\(rad/s\)", also=_has_gyro)
 def read(path: Path) -> RawLog:
     """Read rates and specific force, joined on the stamps of the gyro.
 
-    Returns
-    -------
-    RawLog
-        Rates of the fused motion, which the phone has corrected for its bias, or else of the
-        gyro; specific force from user acceleration and gravity, or else the accelerometer.
-
-    Raises
-    ------
-    DataError
-        The file is damaged, or its sensors have no stamps.
+    Rates of the fused motion, which the phone has corrected for its bias, or else of the gyro;
+    specific force from user acceleration and gravity, or else the accelerometer. DataError: the
+    file is damaged, or its sensors have no stamps.
     """
     raw = csv.parse(path.read_bytes(), path.name, (path,))
     have = set(raw.columns)

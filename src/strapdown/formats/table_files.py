@@ -38,10 +38,7 @@ detect_excel = Signs(suffixes=(".xlsx", ".xlsm"), first=rb"\APK\x03\x04")
 def read_excel(path: Path) -> RawLog:
     """Read the sheet with the most numbers.
 
-    Raises
-    ------
-    DataError
-        The library is missing, the file is damaged, or no sheet has numbers.
+    DataError: the library is missing, the file is damaged, or no sheet has numbers.
     """
     sheets = parse("workbooks.sheets", path)
     counts = {
@@ -117,10 +114,8 @@ detect_json = Signs(suffixes=(*JSON_SUFFIXES, ".txt", ".log"), text=r"\A\s*+[\[{
 def read_json(path: Path) -> RawLog:
     """Read the members of the objects as columns, missing ones as NaN.
 
-    Raises
-    ------
-    DataError
-        A line is not JSON, a value is neither a number nor a text, or the file has no object.
+    DataError: a line is not JSON, a value is neither a number nor a text, or the file has no
+    object.
     """
     if _APART.search(head(path)):
         return _names_apart(path)
@@ -258,10 +253,7 @@ detect_labview = Signs(text=rf"\A{LABVIEW_MAGIC}")
 def read_labview(path: Path) -> RawLog:
     """Read the channels, with the units that the header states.
 
-    Raises
-    ------
-    DataError
-        The header does not end, or a second one follows the rows.
+    DataError: the header does not end, or a second one follows the rows.
     """
     text, _ = csv.decoded(path.read_bytes(), path.name)
     lines = text.split("\n")
@@ -295,10 +287,8 @@ detect_numpy = Signs(named=(".npz",))
 def read_numpy(path: Path) -> RawLog:
     """Read the arrays of a NumPy archive; its content is never executed.
 
-    Raises
-    ------
-    DataError
-        The file is not an archive, is damaged, declares too much data, or holds Python objects.
+    DataError: the file is not an archive, is damaged, declares too much data, or holds Python
+    objects.
     """
     found = arrays_of(path)
     arrays = {name: array for name, array in found.items() if array.ndim}
@@ -385,17 +375,10 @@ detect_parquet = Signs(named=PARQUET_SUFFIXES, first=rb"\A" + re.escape(PARQUET_
 def read_parquet(path: Path) -> RawLog:
     """Read the numeric columns of a table.
 
-    Returns
-    -------
-    RawLog
-        Columns of structures are named ``structure.field``, those of lists of equal length
-        ``list[0]``, ``list[1]`` …; missing values are NaN. The metadata ``unit`` or ``units``
-        of a field, and ``sampling``, ``axes`` and a rate of the table, are understood.
-
-    Raises
-    ------
-    DataError
-        The file is damaged, or declares far more data than it holds.
+    Columns of structures are named ``structure.field``, those of lists of equal length ``list[0]``,
+    ``list[1]`` …; missing values are NaN. The metadata ``unit`` or ``units`` of a field, and
+    ``sampling``, ``axes`` and a rate of the table, are understood. DataError: the file is damaged,
+    or declares far more data than it holds.
     """
     found = parse("parquet.table", path, room=room)
     return raw_log(path, found["arrays"], found["units"], found["meta"])

@@ -74,10 +74,7 @@ def files_of_gnss_ins_sim(path: Path) -> tuple[Path, ...]:
 def read_gnss_ins_sim(path: Path) -> RawLog:
     """Read rates, specific force and magnetic field of the first run.
 
-    Raises
-    ------
-    DataError
-        A table is missing or damaged, or has another number of rows than the stamps.
+    DataError: a table is missing or damaged, or has another number of rows than the stamps.
     """
     path = _folder(path)
     findings: list[Finding] = []
@@ -363,19 +360,12 @@ detect_psins = Signs(named=(SUFFIX,))
 def read_psins(path: Path) -> RawLog:
     """Read the increments of a strapdown unit.
 
-    Returns
-    -------
-    RawLog
-        Columns ``dtheta_x`` … in rad and ``dv_x`` … in m/s, with ``time`` at the end of each
-        interval. A SIMU log is converted with the scale factors and clock of its header, whose
-        position and attitude are kept as `StatedStart`. A plain matrix of seven columns is
-        accepted if the last is a steady clock and the norm of the velocity increments over a
-        step is that of gravity. Any other text is read as a table.
-
-    Raises
-    ------
-    DataError
-        The file is not text, the header is invalid, or a row has another width or no integer.
+    Columns ``dtheta_x`` … in rad and ``dv_x`` … in m/s, with ``time`` at the end of each interval.
+    A SIMU log is converted with the scale factors and clock of its header, whose position and
+    attitude are kept as `StatedStart`. A plain matrix of seven columns is accepted if the last is a
+    steady clock and the norm of the velocity increments over a step is that of gravity. Any other
+    text is read as a table. DataError: the file is not text, the header is invalid, or a row has
+    another width or no integer.
     """
     data = path.read_bytes()
     text, findings = csv.decoded(data, path.name)
@@ -624,10 +614,7 @@ def _arrays(path: Path, stream: str, width: int) -> tuple[Array, Array]:
 def read_python_ins(path: Path) -> RawLog:
     """Read the angular rates and specific force.
 
-    Raises
-    ------
-    DataError
-        The archive is damaged, or its arrays have the wrong shapes.
+    DataError: the archive is damaged, or its arrays have the wrong shapes.
     """
     time, imu = _arrays(path, "imu", len(COLUMNS))
     units = {"gyro": "rad/s", "accel": "m/s2"}
@@ -642,13 +629,7 @@ def read_python_ins_fixes(path: Path) -> Fixes:
 
 
 def read_python_ins_truth(path: Path) -> pd.DataFrame:
-    """Read the trajectory.
-
-    Returns
-    -------
-    DataFrame
-        A Trajectory table.
-    """
+    """Read the trajectory."""
     time, truth = _arrays(path, "reference", 9)
     table = trajectory_table(time, truth[:, :3], truth[:, 3:6], truth[:, 6:], source=path.name)
     table.attrs["findings"] = ()

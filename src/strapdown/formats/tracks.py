@@ -50,10 +50,7 @@ detect_gpx = Signs(text=r"\A[\s\S]{0,4092}?<gpx")
 def read_gpx(path: Path) -> RawLog:
     """Read the points that have a time.
 
-    Raises
-    ------
-    DataError
-        The library is missing, the XML is damaged, or no point has a time.
+    DataError: the library is missing, the XML is damaged, or no point has a time.
     """
     points = parse("recorders.gpx", path)
     times = points["time"]
@@ -195,10 +192,7 @@ detect_fit = Signs(first=rb"\A[\x0c\x0e].{7}\.FIT")
 def read_fit(path: Path) -> RawLog:
     """Read the gyro, with accelerometer and magnetometer interpolated to its stamps.
 
-    Raises
-    ------
-    DataError
-        The library is missing, or the file is damaged.
+    DataError: the library is missing, or the file is damaged.
     """
     messages = _messages(path)
     logs = [_sensor(path, messages, triad) for triad in SENSORS if messages[SENSORS[triad][0]]]
@@ -373,10 +367,7 @@ detect_dji = Signs(text=r"\A[\s\S]{0,4080}?\d:\d\d:\d\d[,.]\d{1,3}\s*-->", also=
 def read_dji(path: Path) -> RawLog:
     """Read the positions.
 
-    Raises
-    ------
-    DataError
-        No subtitle has a position, or the angles may be in radians.
+    DataError: no subtitle has a position, or the angles may be in radians.
     """
     text, findings = csv.decoded(path.read_bytes(), path.name)
     starts = list(_TIME.finditer(text))

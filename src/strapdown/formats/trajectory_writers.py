@@ -504,15 +504,9 @@ LONGEST_PIECE = 4096
 class Thinned:
     """Rows that represent a trajectory on a map.
 
-    Attributes
-    ----------
-    rows : ndarray of int
-        In order, including both ends.
-    samples : int
-        Number of rows of the trajectory.
-    deviation_m : float, m
-        Largest distance of a dropped position from the straight line between its neighbors, at
-        its own time.
+    `rows`: in order, including both ends. `samples`: number of rows of the trajectory.
+    `deviation_m` (m): largest distance of a dropped position from the straight line between its
+    neighbors, at its own time.
     """
 
     rows: NDArray[np.intp]

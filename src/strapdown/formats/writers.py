@@ -85,20 +85,11 @@ Part = str | tuple[str, str]
 class Writer:
     """How streams are written in one format.
 
-    Attributes
-    ----------
-    title : str
-    streams : mapping of str to tuple of parts
-        What it holds of each stream: units, axes, clock. A part that only some tables have is a
-        pair with the column that these have.
-    function : callable
-        Writes a file, or a folder, that does not exist.
-    reader : str or None
-        The key of `formats.READERS` that reads it; None if only other programs do.
-    endings : tuple of str
-        Endings of file names that mean this format; empty for folders.
-    alone : bool
-        Whether a file holds one stream only: the first of `streams` that there is.
+    `streams`: what it holds of each stream: units, axes, clock. A part that only some tables have
+    is a pair with the column that these have. `function`: writes a file, or a folder, that does not
+    exist. `reader`: the key of `formats.READERS` that reads it; None if only other programs do.
+    `endings`: endings of file names that mean this format; empty for folders. `alone`: whether a
+    file holds one stream only: the first of `streams` that there is.
     """
 
     title: str

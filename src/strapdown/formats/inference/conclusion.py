@@ -30,21 +30,12 @@ LEAST_SHARE = 0.005
 class Inference:
     """Inference of one quantity from the numbers of a log.
 
-    Attributes
-    ----------
-    quantity : str
-        ``time_unit``, ``time_faults``, ``rate``, ``accel_unit``, ``gravity``, ``accel_form``,
-        ``gyro_unit``, ``gyro_form``, ``gyro_axes``, ``up_axis``, ``accel_sign``, ``mag_unit``.
-    value : str, float or None
-        The most probable answer; None if no known one fits.
-    confidence : float
-        Its probability, 0 to 1.
-    evidence : tuple of Finding
-        The numbers that it is based on.
-    alternatives : tuple of (value, float)
-        The other answers with their probabilities, the most probable first.
-    flag : str
-        The option that answers the question; empty if there is none.
+    `quantity`: ``time_unit``, ``time_faults``, ``rate``, ``accel_unit``, ``gravity``,
+    ``accel_form``, ``gyro_unit``, ``gyro_form``, ``gyro_axes``, ``up_axis``, ``accel_sign``,
+    ``mag_unit``. `value`: the most probable answer; None if no known one fits. `confidence`: its
+    probability, 0 to 1. `evidence`: the numbers that it is based on. `alternatives`: the other
+    answers with their probabilities, the most probable first. `flag`: the option that answers the
+    question; empty if there is none.
     """
 
     quantity: str
@@ -163,18 +154,9 @@ COUNTER_BITS = (16, 24, 31, 32)
 class Steps:
     """Steps between the stamps of a log, in their unit; computed once for all questions.
 
-    Attributes
-    ----------
-    stamps : ndarray, (n,)
-        Finite, as in the log.
-    steps : ndarray, (n - 1,)
-    forward : ndarray
-        The positive ones.
-    mean : float
-        Of the forward steps within 50 times their median, as the clock may be set between; 0 if
-        time does not advance.
-    median : float
-        Of the forward steps; 0 if time does not advance.
+    `stamps` ((n,)): finite, as in the log. `steps` ((n - 1,)). `forward`: the positive ones.
+    `mean`: of the forward steps within 50 times their median, as the clock may be set between; 0 if
+    time does not advance. `median`: of the forward steps; 0 if time does not advance.
     """
 
     stamps: NDArray[Any]
