@@ -26,7 +26,7 @@ from strapdown.attitude_comparison.comparison import (
 from strapdown.attitude_comparison.options import AttitudeOptions
 from strapdown.attitude_comparison.references import motion_finding
 from strapdown.attitude_comparison.source import magnetic_north
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.increments import BETWEEN_STAMPS, increments_from_imu
 from strapdown.orientation_filters import (
     FILTERS,
@@ -352,7 +352,7 @@ def _filtered(
     felt = imu.reindex(columns=ACCEL).dropna()  # a filter refuses a log without them
     force = np.linalg.norm(felt.to_numpy(dtype=np.float64), axis=1)
     if force.size and not WEAKEST < (median := float(np.median(force))) < STRONGEST:
-        findings.append(Finding("attitude.no-gravity-in-force", quantity="accel", force=median))
+        add_warning(findings, "attitude.no-gravity-in-force", quantity="accel", force=median)
     if gyro_bias is not None:
         bias = _bias(gyro_bias, find_rests(imu) if isinstance(gyro_bias, str) else ())
         imu = imu.copy()
@@ -361,14 +361,7 @@ def _filtered(
     if chosen != asked:
         findings.append(motion_finding(chosen, imu))
     if run.disturbed >= REPORTED:
-        findings.append(
-            Finding(
-                "attitude.field-disturbed",
-                quantity=chosen.label,
-                severity="note",
-                share=run.disturbed,
-            )
-        )
+        add_note(findings, "attitude.field-disturbed", quantity=chosen.label, share=run.disturbed)
     out = Attitude(attitude_table(imu.index.to_numpy(), run.q_nb, source=name))
     sd = run.euler_sd()
     if sd is not None:

@@ -17,7 +17,14 @@ from strapdown.api.reading import ImuFile, Streams
 from strapdown.bundle import read_manifest
 from strapdown.config.logs import FixesTable, LogTable
 from strapdown.config.spec import specify
-from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
+from strapdown.errors import (
+    ConfigError,
+    DataError,
+    Finding,
+    StrapdownError,
+    add_warning,
+    check_choice,
+)
 from strapdown.formats import STREAMS, open_stream
 from strapdown.formats.clocks import RELATIVE, Clock, clock_of, own_ns, read_stamps, with_clock
 from strapdown.formats.columns import parse_axes
@@ -280,7 +287,7 @@ def _cut(
             ns, ends = own_ns(table), own_ns(imu)
             keep = (ns >= ends[0]) & (ns <= ends[-1])
         else:
-            findings.append(Finding("io.stream-not-cut", quantity=name, stream=name))
+            add_warning(findings, "io.stream-not-cut", quantity=name, stream=name)
             keep = np.ones(len(table), dtype=bool)
         if not keep.any():
             raise ConfigError("io.stream-empty-part", quantity=name, stream=name)

@@ -27,7 +27,7 @@ from strapdown.bundle import atomic_folder
 from strapdown.bundle.atomic_folder import MANIFEST as MANIFEST
 from strapdown.bundle.atomic_folder import check_destination as check_destination
 from strapdown.bundle.atomic_folder import claimed as claimed
-from strapdown.errors import ConfigError, DataError, Finding, printable
+from strapdown.errors import ConfigError, DataError, Finding, add_warning, printable
 
 TIMING = "timing.json"
 LATENCY = "latency.json"
@@ -558,19 +558,19 @@ def unsealed_changes(
         own = item.get("kept", "copy") == "copy"
         path = bundle / name if own else (moved or {}).get(name, Path(name))
         if own and _is_linked(bundle, name):
-            changes.append(Finding("bundle.a-link", file=name))
+            add_warning(changes, "bundle.a-link", file=name)
         elif not path.is_file():
-            changes.append(Finding("bundle.file-missing", file=name))
+            add_warning(changes, "bundle.file-missing", file=name)
         elif sha256(path) != item["sha256"]:
-            changes.append(Finding("bundle.file-changed", file=name))
+            add_warning(changes, "bundle.file-changed", file=name)
         elif path.stat().st_size != item["bytes"]:
-            changes.append(Finding("bundle.other-size", file=name, bytes=item["bytes"]))
+            add_warning(changes, "bundle.other-size", file=name, bytes=item["bytes"])
     for name in files_of(bundle):
         beside = name in (MANIFEST, *UNSEALED) or SIGNATURE_FILE.fullmatch(name)
         if beside and (bundle / name).is_symlink():
-            changes.append(Finding("bundle.a-link", file=name))
+            add_warning(changes, "bundle.a-link", file=name)
         elif not beside and name not in items:
-            changes.append(Finding("bundle.not-in-manifest", file=name))
+            add_warning(changes, "bundle.not-in-manifest", file=name)
     return changes
 
 

@@ -17,7 +17,14 @@ import numpy as np
 import pandas as pd
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
+from strapdown.errors import (
+    ConfigError,
+    DataError,
+    Finding,
+    StrapdownError,
+    add_warning,
+    check_choice,
+)
 from strapdown.formats import (
     android_events,
     ardupilot,
@@ -657,7 +664,7 @@ def _calibrated(recording: Recording, asked: ReadOptions) -> Recording:
     if known.not_observed:
         data = {"calibration": Path(str(asked.calibration)).name, "names": known.missing}
         code = "calibrate.applied-in-part"
-        said.append(Finding(code, severity="warning", file=recording.name, data=data))
+        add_warning(said, code, file=recording.name, data=data)
     said += _of_another_sensor(imu, known, recording.name, Path(str(asked.calibration)).name)
     return dataclasses.replace(recording, imu=imu, findings=(*recording.findings, *said))
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_note
 from strapdown.formats import csv, data_sets, holds, open_stream, read_raw, reader_of, table_files
 from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, on_clock_of, unrolled, with_clock
@@ -121,15 +121,7 @@ def read_aid_table(
     values = {name: found[name].values(raw, name) for name in there}
     for name, unit in columns.items():
         if name in values and UNITS[unit] and not found[name].stated:
-            findings.append(
-                Finding(
-                    "io.unit-assumed",
-                    file=raw.name,
-                    quantity=name,
-                    severity="note",
-                    unit=unit,
-                )
-            )
+            add_note(findings, "io.unit-assumed", file=raw.name, quantity=name, unit=unit)
     keep = _usable(raw, time, values, repair, findings)
     table = pd.DataFrame(
         {name: block[keep] for name, block in values.items()},
@@ -328,16 +320,7 @@ def _refuse_or_say(
     fault = Finding(code, file=raw.name, row=raw.row(int(rows[0])), quantity=name, count=rows.size)
     if not repair:
         raise DataError(fault)
-    findings.append(
-        Finding(
-            "io.left-out",
-            file=fault.file,
-            row=fault.row,
-            quantity=name,
-            severity="note",
-            reason=fault,
-        )
-    )
+    add_note(findings, "io.left-out", file=fault.file, row=fault.row, quantity=name, reason=fault)
 
 
 #: Columns, m.

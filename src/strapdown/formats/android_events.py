@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
 from strapdown.formats.columns import read_name, split_brackets
 from strapdown.formats.find_columns import LOOSEST, norm_and_spread
@@ -223,9 +223,7 @@ def read(path: Path) -> RawLog:
             continue
         if len(fields) < first + 3:
             if row == len(lines) and not text.endswith("\n"):
-                findings.append(
-                    Finding("io.last-line-cut-left-out", file=path.name, row=row, severity="note")
-                )
+                add_note(findings, "io.last-line-cut-left-out", file=path.name, row=row)
                 continue
             raise DataError(
                 "io.fields-expected", file=path.name, row=row, count=len(fields), width=first + 3
@@ -234,9 +232,7 @@ def read(path: Path) -> RawLog:
         events.setdefault(which, []).append((row, fields[stamp], *fields[first : first + 3]))
     others = sorted(u for u in unknown if u and not read_name(u).quantity)[:6]
     if others:
-        findings.append(
-            Finding("io.events-not-used", file=path.name, severity="note", kinds=others)
-        )
+        add_note(findings, "io.events-not-used", file=path.name, kinds=others)
     columns = {k: _columns(path, k, rows) for k, rows in events.items()}
     android = any(
         (word := name.strip(" \"'").lower()).isdigit()
@@ -325,18 +321,14 @@ def joined(
         if kind is not None:
             logs.append(log(kind, triad))
             if kind != triad and triad == "gyro":
-                findings.append(
-                    Finding(
-                        "io.uncalibrated-gyro", file=path.name, quantity="gyro", severity="note"
-                    )
-                )
+                add_note(findings, "io.uncalibrated-gyro", file=path.name, quantity="gyro")
         elif triad == "accel" and {"linear", "gravity"} <= events.keys():
             logs.append(force_of(log("linear", "accel"), log("gravity", "accel")))
         elif triad == "accel" and "linear" in events and not android and _has_gravity(events):
             logs.append(log("linear", "accel"))
         elif triad == "accel" and "linear" in events:
-            findings.append(
-                Finding("io.left-out-without-gravity-no", file=path.name, quantity="accel")
+            add_warning(
+                findings, "io.left-out-without-gravity-no", file=path.name, quantity="accel"
             )
     for one in logs:
         one.stated = {c: (q, u or None) for c, (q, u) in one.stated.items()}

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.columns import read_name
@@ -235,26 +235,22 @@ def _with(raw: RawLog, q_ns: Array, known: RawLog) -> RawLog:
         mean = rotation.rotate(q_ns[at], force[at]).mean(axis=0)
         tilt = float(np.degrees(np.arctan2(np.hypot(mean[0], mean[1]), -mean[2])))
     if not tilt <= MOST_TILT:
-        findings.append(
-            Finding(
-                "io.left-out-attitude-leans" if at.any() else "io.left-out-attitude-far",
-                file=known.name,
-                quantity="attitude",
-                severity="note",
-                tilt_deg=tilt,
-            )
-        )
-        return dataclasses.replace(raw, findings=findings)
-    findings.append(
-        Finding(
-            "io.interpolated-samples-specific-force-average",
+        add_note(
+            findings,
+            "io.left-out-attitude-leans" if at.any() else "io.left-out-attitude-far",
             file=known.name,
             quantity="attitude",
-            severity="note",
-            at=int(at.sum()),
-            size=at.size,
-            tilt=tilt,
+            tilt_deg=tilt,
         )
+        return dataclasses.replace(raw, findings=findings)
+    add_note(
+        findings,
+        "io.interpolated-samples-specific-force-average",
+        file=known.name,
+        quantity="attitude",
+        at=int(at.sum()),
+        size=at.size,
+        tilt=tilt,
     )
     return dataclasses.replace(
         raw,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.arrays import as_rows, numbers, ticks_of
 from strapdown.formats.clocks import (
     RELATIVE,
@@ -174,16 +174,15 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         findings.append(_said_of_coarse(raw, even, TIME_UNITS[stamps.unit]))
     if bursts is not None:
         factor = TIME_UNITS[stamps.unit]
-        findings.append(
-            Finding(
-                "io.stamps-shared-by-bursts",
-                file=raw.name,
-                quantity="time",
-                size=bursts.size,
-                rate_hz=1.0 / (bursts.step * factor),
-                spread=bursts.spread * factor,
-                interval=bursts.size * bursts.step * factor,
-            )
+        add_warning(
+            findings,
+            "io.stamps-shared-by-bursts",
+            file=raw.name,
+            quantity="time",
+            size=bursts.size,
+            rate_hz=1.0 / (bursts.step * factor),
+            spread=bursts.spread * factor,
+            interval=bursts.size * bursts.step * factor,
         )
     readings = [time_reading(raw, found, stamps, int(kept[0]))]
     body, block = _block(values, units, kept.size, keep)
@@ -352,14 +351,13 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
         forces = [n for n in names if read_name(n).quantity in ACCEL]
         if {read_name(n).quantity for n in forces} == set(ACCEL):
             named = {read_name(n).quantity: n for n in reversed(forces)}
-            out.append(
-                Finding(
-                    "io.accelerometer-not-read",
-                    file=raw.name,
-                    quantity="accel",
-                    names=forces,
-                    **_as_accelerometer(raw, [named[q] for q in ACCEL]),
-                )
+            add_warning(
+                out,
+                "io.accelerometer-not-read",
+                file=raw.name,
+                quantity="accel",
+                names=forces,
+                **_as_accelerometer(raw, [named[q] for q in ACCEL]),
             )
         elif not forces:
             out += [_like_gravity(raw, three, norm) for three, norm in steady_triads(raw, names)]
@@ -574,16 +572,14 @@ def stamps_of_log(
         why = f"no time column: {rate:g} Hz as stated"
         if numbered := counted(raw.columns):
             name, count = numbered
-            findings.append(
-                Finding(
-                    "io.time-from-counter",
-                    file=raw.name,
-                    quantity="time",
-                    severity="note",
-                    source=name,
-                    rate=rate,
-                    lost=int(count[-1]) + 1 - count.size,
-                )
+            add_note(
+                findings,
+                "io.time-from-counter",
+                file=raw.name,
+                quantity="time",
+                source=name,
+                rate=rate,
+                lost=int(count[-1]) + 1 - count.size,
             )
             said_by = f"samples as numbered by {name!r}, {rate:g} Hz as stated"
             return read_stamps(
@@ -598,15 +594,13 @@ def stamps_of_log(
         return Stamps(rows / rate, "s", why, everything, Origin(0, "s"), [])
     column = found["time"]
     if options.rate is not None:
-        findings.append(
-            Finding(
-                "io.rate-not-used",
-                file=raw.name,
-                quantity="time",
-                severity="note",
-                rate=options.rate,
-                source=column.source,
-            )
+        add_note(
+            findings,
+            "io.rate-not-used",
+            file=raw.name,
+            quantity="time",
+            rate=options.rate,
+            source=column.source,
         )
     unit, why = column.unit, "in its name"
     if dated:
@@ -661,14 +655,7 @@ def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]
     """
     asked = (options.sampling or raw.sampling or "").lower()
     if not asked:
-        findings.append(
-            Finding(
-                "io.sampling-taken-as-instantaneous",
-                severity="note",
-                file=raw.name,
-                quantity="sampling",
-            )
-        )
+        add_note(findings, "io.sampling-taken-as-instantaneous", file=raw.name, quantity="sampling")
         return "instantaneous"
     check_choice("io.sampling-unknown", SAMPLINGS, quantity="--sampling", asked=asked)
     return asked
@@ -696,19 +683,18 @@ def report_gaps(name: str, time: Array, gyro: Array, findings: list[Finding]) ->
     worst = max(gaps, key=lambda g: g.length)
     speed = np.sqrt((gyro[worst.sample - 1 : worst.sample + 1] ** 2).sum(axis=1)).max()
     missed = float(np.degrees(speed * worst.length))
-    findings.append(
-        Finding(
-            "io.long-gap" if worst.length >= LONG_GAP else "io.gaps",
-            file=name,
-            quantity="time",
-            severity="warning" if worst.length >= LONG_GAP else "note",
-            count=len(gaps),
-            length=worst.length,
-            start=worst.start,
-            end=worst.end,
-            usual=worst.usual,
-            missed_deg=missed,
-        )
+    add_warning(
+        findings,
+        "io.long-gap" if worst.length >= LONG_GAP else "io.gaps",
+        file=name,
+        quantity="time",
+        severity="warning" if worst.length >= LONG_GAP else "note",
+        count=len(gaps),
+        length=worst.length,
+        start=worst.start,
+        end=worst.end,
+        usual=worst.usual,
+        missed_deg=missed,
     )
 
 
@@ -745,26 +731,24 @@ def report_absurd(
     if LASTING_RATE < largest[k] <= ABSURD_RATE:
         lasting = float(np.quantile(np.sqrt((gyro * gyro).sum(axis=1)), 0.95))
     if LASTING_RATE < lasting <= largest[k]:
-        findings.append(
-            Finding(
-                "io.rate-absurd-for-long",
-                file=name,
-                quantity="gyro",
-                lasting=lasting,
-                lasting_2=lasting / (2 * np.pi),
-            )
+        add_warning(
+            findings,
+            "io.rate-absurd-for-long",
+            file=name,
+            quantity="gyro",
+            lasting=lasting,
+            lasting_2=lasting / (2 * np.pi),
         )
     if largest[k] > ABSURD_RATE:
         at = int(np.abs(gyro[:, k]).argmax())
-        findings.append(
-            Finding(
-                "io.rate-absurd",
-                file=name,
-                row=row(at),
-                quantity=f"gyro_{PLAUSIBILITY_AXES[k]}",
-                gyro=gyro[at, k],
-                largest=largest[k] / (2 * np.pi),
-            )
+        add_warning(
+            findings,
+            "io.rate-absurd",
+            file=name,
+            row=row(at),
+            quantity=f"gyro_{PLAUSIBILITY_AXES[k]}",
+            gyro=gyro[at, k],
+            largest=largest[k] / (2 * np.pi),
         )
     for k in range(3):
         reading = float(np.degrees(largest[k]))
@@ -775,15 +759,14 @@ def report_absurd(
         full = np.abs(gyro[:, k]) == largest[k]
         run = np.convolve(full, np.ones(CUT_OFF_RUN), mode="valid") == CUT_OFF_RUN
         if run.any():
-            findings.append(
-                Finding(
-                    "io.rate-at-full-scale",
-                    file=name,
-                    row=row(int(run.argmax())),
-                    quantity=f"gyro_{PLAUSIBILITY_AXES[k]}",
-                    full=int(full.sum()),
-                    reading=reading,
-                )
+            add_warning(
+                findings,
+                "io.rate-at-full-scale",
+                file=name,
+                row=row(int(run.argmax())),
+                quantity=f"gyro_{PLAUSIBILITY_AXES[k]}",
+                full=int(full.sum()),
+                reading=reading,
             )
 
 
@@ -806,7 +789,7 @@ def report_weightless(name: str, accel: Array | None, findings: list[Finding]) -
         usual = float(np.sqrt(np.median((some * some).sum(axis=1))))
     if usual < WEIGHTLESS:
         reason = Finding("io.evidence-force-too-small", severity="note", usual=usual)
-        findings.append(Finding("io.no-gravity", file=name, quantity="accel", reason=reason))
+        add_warning(findings, "io.no-gravity", file=name, quantity="accel", reason=reason)
 
 
 def finite_rows(
@@ -844,15 +827,13 @@ def finite_rows(
                 source=found[quantity].source,
                 count=count,
             )
-        findings.append(
-            Finding(
-                "io.rows-without-number-left-out",
-                file=raw.name,
-                row=raw.row(row),
-                quantity=quantity,
-                severity="note",
-                count=count,
-            )
+        add_note(
+            findings,
+            "io.rows-without-number-left-out",
+            file=raw.name,
+            row=raw.row(row),
+            quantity=quantity,
+            count=count,
         )
         keep &= ~bad.any(axis=1)
     if not keep.any():
@@ -896,14 +877,7 @@ def truth_of_log(
             if raw.axes != "x,y,z" and any(
                 set(names) <= set(found) for names in (QUATERNIONS, EULERS)
             ):
-                findings.append(
-                    Finding(
-                        "io.attitude-not-used",
-                        severity="note",
-                        file=raw.name,
-                        quantity="attitude",
-                    )
-                )
+                add_note(findings, "io.attitude-not-used", file=raw.name, quantity="attitude")
             return None, None
         # Avoid copies of a long log.
         q = q if kept.size == len(q) else q[kept]

@@ -26,7 +26,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats.inference.conclusion import (
     THRESHOLD,
     differenced,
@@ -484,14 +484,12 @@ def read_stamps(
         whole, weeks = unrolled(stamps.astype(np.float64, copy=False))
         if weeks:
             stamps, unit = whole, "s"
-            findings.append(
-                Finding(
-                    "io.seconds-of-week-unrolled",
-                    file=file,
-                    row=row(weeks[0]),
-                    quantity="time",
-                    severity="note",
-                )
+            add_note(
+                findings,
+                "io.seconds-of-week-unrolled",
+                file=file,
+                row=row(weeks[0]),
+                quantity="time",
             )
     # Exact, before a factor rounds it.
     ticks = filled(len(stamps), lambda part: (stamps[part] - stamps[0]).astype(np.float64))
@@ -505,14 +503,13 @@ def read_stamps(
     elif (usual := _mean_step(ticks[kept]) * TIME_UNITS[unit]) > 0 and not (
         PLAUSIBLE_STEP[0] <= usual <= 4 * PLAUSIBLE_STEP[1]
     ):
-        findings.append(
-            Finding(
-                "io.stated-time-unit-implausible",
-                file=file,
-                quantity="time",
-                unit=unit,
-                usual=1.0 / usual,
-            )
+        add_warning(
+            findings,
+            "io.stated-time-unit-implausible",
+            file=file,
+            quantity="time",
+            unit=unit,
+            usual=1.0 / usual,
         )
     factor = TIME_UNITS[unit]
     first = stamps[0].item()
@@ -520,15 +517,13 @@ def read_stamps(
         far = abs(first) * factor > EPOCH
         origin = Origin(first if far else 0, unit)
         if far:
-            findings.append(
-                Finding(
-                    "io.time-from-first-stamp",
-                    file=file,
-                    quantity="time",
-                    severity="note",
-                    first=first,
-                    unit=unit,
-                )
+            add_note(
+                findings,
+                "io.time-from-first-stamp",
+                file=file,
+                quantity="time",
+                first=first,
+                unit=unit,
             )
     # Exact if both count whole ticks of one unit.
     if unit == origin.unit:
@@ -712,28 +707,19 @@ def _repaired(
             added[k + 1] = 2.0**bits
     if wraps := int(np.count_nonzero(added)):
         ticks = ticks + np.cumsum(added)
-        findings.append(
-            Finding(
-                "io.counter-wrapped-undone",
-                file=file,
-                quantity="time",
-                severity="note",
-                count=wraps,
-            )
-        )
+        add_note(findings, "io.counter-wrapped-undone", file=file, quantity="time", count=wraps)
     latest = np.maximum.accumulate(np.concatenate([[-np.inf], ticks[:-1]]))
     keep = ticks > latest
     if dropped := int((~keep).sum()):
         back = _set_back(ticks, keep, usual)
-        findings.append(
-            Finding(
-                "io.rows-not-later-left-out" if not back else "io.rows-after-step-back-left-out",
-                file=file,
-                quantity="time",
-                severity="warning" if back or dropped > 0.1 * ticks.size else "note",
-                count=dropped,
-                back=back,
-            )
+        add_warning(
+            findings,
+            "io.rows-not-later-left-out" if not back else "io.rows-after-step-back-left-out",
+            file=file,
+            quantity="time",
+            severity="warning" if back or dropped > 0.1 * ticks.size else "note",
+            count=dropped,
+            back=back,
         )
     return keep, ticks
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import frames, rotation
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import table_files
 from strapdown.formats.clocks import RELATIVE, Clock
 from strapdown.formats.gnss_fixes import Fixes
@@ -141,9 +141,7 @@ def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None
     order = order[np.diff(times[order], prepend=-np.inf) > 0]
     time = raw.columns[next(n for n, (q, _) in raw.stated.items() if q == "time")]
     if order.size < 2:
-        raw.findings.append(
-            Finding("io.left-out-poses-hold-no", file=name, quantity="attitude", severity="note")
-        )
+        add_note(raw.findings, "io.left-out-poses-hold-no", file=name, quantity="attitude")
         return None, files
     lat_deg, lon_deg, _ = frames.geodetic_from_ecef(positions[order]).T
     q_nd = rotation.compose(frames.q_ne(lat_deg, lon_deg), q_ed[order] / norm[order, None])
@@ -152,16 +150,14 @@ def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None
     truth[sample] = q
     if sample.size:
         off = np.abs(times[order][:, None] - time[sample]).min(axis=0).max()
-        raw.findings.append(
-            Finding(
-                "io.attitude-frames-turned-ecef-north",
-                file=name,
-                quantity="attitude",
-                severity="note",
-                size=order.size,
-                size_2=sample.size,
-                off=off,
-            )
+        add_note(
+            raw.findings,
+            "io.attitude-frames-turned-ecef-north",
+            file=name,
+            quantity="attitude",
+            size=order.size,
+            size_2=sample.size,
+            off=off,
         )
     return TruthInSensorAxes(truth, np.isfinite(truth).all(axis=1)), files
 
@@ -292,20 +288,17 @@ def read_fixes(path: Path) -> Fixes:
 def _dated(t: Array, utc: Array, name: str, findings: list[Finding]) -> Array:
     """Compute when each fix was measured, on the clock of the stamps."""
     if not (np.isfinite(utc).all() and np.isfinite(t).all() and (np.diff(utc) > 0.0).all()):
-        findings.append(
-            Finding("io.not-every-fix-utc-later", file=name, quantity="time", severity="note")
-        )
+        add_note(findings, "io.not-every-fix-utc-later", file=name, quantity="time")
         return t
     seconds = utc * 1e-3 if utc.max() > IN_MS else utc
     late = t - seconds
     late -= late.min()
-    findings.append(
-        Finding(
-            "io.comma2k19-fixes-dated-by-utc",
-            file=name,
-            quantity="time",
-            late=late.max(),
-            median=np.median(late),
-        )
+    add_warning(
+        findings,
+        "io.comma2k19-fixes-dated-by-utc",
+        file=name,
+        quantity="time",
+        late=late.max(),
+        median=np.median(late),
     )
     return np.asarray(t - late)

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
 from strapdown.formats.crash_record import (
     LONGEST_NAME,
@@ -597,17 +597,16 @@ def _one_unit(table: _Table, file: str, findings: list[Finding]) -> _Table:
             data: dict[str, Any] = {"name": a.heading, "other": b.heading}
             if apart.size and apart.max() > limit:
                 k = int(np.argmax(apart))
-                findings.append(
-                    Finding(
-                        "io.edr-units-disagree",
-                        file=file,
-                        row=int(table.rows[k]),
-                        quantity="unit",
-                        value=float(x[k]),
-                        value_2=float(y[k]),
-                        unit=_si(a),
-                        **data,
-                    )
+                add_warning(
+                    findings,
+                    "io.edr-units-disagree",
+                    file=file,
+                    row=int(table.rows[k]),
+                    quantity="unit",
+                    value=float(x[k]),
+                    value_2=float(y[k]),
+                    unit=_si(a),
+                    **data,
                 )
                 continue
             fine = rounding(a.values) * _factor(a) <= rounding(b.values) * _factor(b)
@@ -615,9 +614,7 @@ def _one_unit(table: _Table, file: str, findings: list[Finding]) -> _Table:
             gone.add(id(coarse))
             data["name"] = (b if coarse is a else a).heading
             data["other"] = coarse.heading
-            findings.append(
-                Finding("io.edr-two-units", file=file, severity="note", quantity="unit", **data)
-            )
+            add_note(findings, "io.edr-two-units", file=file, quantity="unit", **data)
     return replace(table, columns=tuple(c for c in table.columns if id(c) not in gone))
 
 
@@ -644,7 +641,7 @@ def _of_lines(text: _Text, file: str) -> list[Finding]:
         label, _, value = line.rpartition(",")
         lower = label.lower()
         if "complete file" in lower and value.strip().lower() in _OFF:
-            findings.append(Finding("io.edr-not-complete", file=file, quantity="complete file"))
+            add_warning(findings, "io.edr-not-complete", file=file, quantity="complete file")
         axis = next((a for a in ("longitudinal", "lateral") if a in lower), "")
         units = _units_of(label)
         unit = (
@@ -705,28 +702,26 @@ def _of_table(table: _Table, file: str) -> list[Finding]:
         largest = float(np.abs(v).max())
         at_end = np.flatnonzero(np.abs(v) >= largest - 0.5 * step) if step else np.array([], int)
         if largest >= DELTA_V_RANGE - 0.5 * max(step, KMH) and at_end.size > 1:
-            findings.append(
-                Finding(
-                    "io.edr-at-range-end",
-                    **where,
-                    row=int(table.rows[there][at_end[0]]),
-                    axis=said.axis.lstrip("-"),
-                    reached=largest / KMH,
-                    count=at_end.size,
-                )
+            add_warning(
+                findings,
+                "io.edr-at-range-end",
+                **where,
+                row=int(table.rows[there][at_end[0]]),
+                axis=said.axis.lstrip("-"),
+                reached=largest / KMH,
+                count=at_end.size,
             )
         late = np.flatnonzero(time[there] >= time[there][-1] - 1.01 * END_SPAN)
         if v.size > 2 and late.size > 1:
             change = abs(float(v[-1] - v[late[0]]))
             if change > END_CHANGE + step:
-                findings.append(
-                    Finding(
-                        "io.edr-ends-in-event",
-                        **where,
-                        row=int(table.rows[there][-1]),
-                        axis=said.axis.lstrip("-"),
-                        end=float(time[there][-1]),
-                        change=change / KMH,
-                    )
+                add_warning(
+                    findings,
+                    "io.edr-ends-in-event",
+                    **where,
+                    row=int(table.rows[there][-1]),
+                    axis=said.axis.lstrip("-"),
+                    end=float(time[there][-1]),
+                    change=change / KMH,
                 )
     return findings

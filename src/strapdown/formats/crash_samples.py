@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.crash_record import CrashChannel
 from strapdown.formats.inference.conclusion import infer_time_unit
@@ -76,15 +76,13 @@ def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
     if abs(float(stamps[0])) * factor <= EPOCH:
         return stamps.astype(np.float64) * factor, findings
     midnight = last_midnight(stamps[0].item(), factor)
-    findings.append(
-        Finding(
-            "io.crash-time-from-midnight",
-            file=clock.file,
-            quantity=f"time ({clock.name})",
-            severity="note",
-            midnight=midnight,
-            unit=unit,
-        )
+    add_note(
+        findings,
+        "io.crash-time-from-midnight",
+        file=clock.file,
+        quantity=f"time ({clock.name})",
+        midnight=midnight,
+        unit=unit,
     )
     return (stamps - midnight).astype(np.float64) * factor, findings
 
@@ -246,10 +244,10 @@ def of_start(found: FromZero, channel: CrashChannel, unit: float = 1.0) -> list[
     where: dict[str, Any] = {"file": channel.file or None, "quantity": f"channel {channel.name}"}
     findings = []
     if found.late:
-        findings.append(Finding("io.delta-v-begins-late", **where, first=found.late))
+        add_warning(findings, "io.delta-v-begins-late", **where, first=found.late)
     if found.offset:
         offset = found.offset * unit * 3.6
-        findings.append(Finding("io.delta-v-offset-at-start", **where, offset=offset))
+        add_warning(findings, "io.delta-v-offset-at-start", **where, offset=offset)
     return findings
 
 

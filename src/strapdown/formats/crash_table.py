@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
 from strapdown.formats.arrays import day_nanoseconds, numbers, ticks_of
 from strapdown.formats.columns import read_name
@@ -95,9 +95,7 @@ def record_of(
         (kept if _is_numeric(raw, source) else texts).append(source)
     if texts:
         shown = ", ".join(clean(t, 40) for t in texts[:6]) + (" …" if len(texts) > 6 else "")
-        findings.append(
-            Finding("io.columns-text-left-out", file=raw.name, severity="note", value_shown=shown)
-        )
+        add_note(findings, "io.columns-text-left-out", file=raw.name, value_shown=shown)
     if not kept:
         raise DataError("io.no-numeric-column", file=raw.name)
     notes = notes or {}
@@ -197,28 +195,25 @@ def _clock(
     stated = [s for s in times if said[s].unit] or times
     if len(stated) > 1:
         others = ", ".join(names[s] for s in stated[1:])
-        findings.append(
-            Finding(
-                "io.taken-time-could-too",
-                file=raw.name,
-                quantity="time",
-                names=names[stated[0]],
-                others=others,
-                names_2=names[stated[1]],
-            )
+        add_warning(
+            findings,
+            "io.taken-time-could-too",
+            file=raw.name,
+            quantity="time",
+            names=names[stated[0]],
+            others=others,
+            names_2=names[stated[1]],
         )
     if stated:
         return stated[0]
     first = next(iter(said))
     if _advances(raw.columns[first]) and said[first].quantity == "other" and len(said) > 1:
-        findings.append(
-            Finding(
-                "io.advances-evenly-taken-time",
-                severity="note",
-                file=raw.name,
-                quantity="time",
-                names=names[first],
-            )
+        add_note(
+            findings,
+            "io.advances-evenly-taken-time",
+            file=raw.name,
+            quantity="time",
+            names=names[first],
         )
         return first
     return ""
@@ -393,14 +388,12 @@ def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
             notes[names[column - 1]] = checked
         except (DataError, ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
             reason = error.finding if isinstance(error, DataError) else None
-            raw.findings.append(
-                Finding(
-                    "io.comment-of-no-channel" if reason is None else "io.comment-left-out",
-                    file=raw.name,
-                    row=row,
-                    severity="note",
-                    reason=reason,
-                )
+            add_note(
+                raw.findings,
+                "io.comment-of-no-channel" if reason is None else "io.comment-left-out",
+                file=raw.name,
+                row=row,
+                reason=reason,
             )
     return notes
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.crash_record import (
     QUANTITIES,
@@ -170,14 +170,13 @@ def _tell_axis(channel: CrashChannel, axis: str, sign: float, findings: list[Fin
         return
     taken = f"{'-' if sign < 0 else ''}{axis}"
     if channel.axis != taken:
-        findings.append(
-            Finding(
-                "io.record-along-taken-along",
-                file=channel.file or None,
-                quantity=f"channel {channel.name}",
-                axis=channel.axis,
-                taken=taken,
-            )
+        add_warning(
+            findings,
+            "io.record-along-taken-along",
+            file=channel.file or None,
+            quantity=f"channel {channel.name}",
+            axis=channel.axis,
+            taken=taken,
         )
 
 
@@ -215,13 +214,11 @@ def _as_mean(
         )
     _check_finite(channel, stamps, values)
     from_zero = channel.from_zero
-    findings.append(
-        Finding(
-            "io.velocity-made-means-from-zero" if from_zero else "io.velocity-made-means",
-            file=channel.file or None,
-            quantity=f"channel {channel.name}",
-            severity="note",
-        )
+    add_note(
+        findings,
+        "io.velocity-made-means-from-zero" if from_zero else "io.velocity-made-means",
+        file=channel.file or None,
+        quantity=f"channel {channel.name}",
     )
     if not from_zero:
         return mean_accelerations_of(stamps, values)
@@ -279,13 +276,11 @@ def _sampling(
             stated=stated,
         )
     if not kinds and stated is None:
-        findings.append(
-            Finding(
-                "io.crash-sampling-taken-as-instantaneous",
-                severity="note",
-                file=record.path.name,
-                quantity="sampling",
-            )
+        add_note(
+            findings,
+            "io.crash-sampling-taken-as-instantaneous",
+            file=record.path.name,
+            quantity="sampling",
         )
     return stated or (str(kinds.pop()) if kinds else "instantaneous")
 
@@ -441,14 +436,12 @@ def _even(
                 rate_hz=rate_hz,
                 recorded=recorded,
             )
-        findings.append(
-            Finding(
-                "io.stamps-evenly-spaced-hz-first",
-                file=record.path.name,
-                quantity="time",
-                severity="note",
-                rate_hz=rate_hz,
-            )
+        add_note(
+            findings,
+            "io.stamps-evenly-spaced-hz-first",
+            file=record.path.name,
+            quantity="time",
+            rate_hz=rate_hz,
         )
     return start + count / rate_hz
 
@@ -537,30 +530,27 @@ def triad_factor(
             wanted = next(iter(own.values()))
             without = ", ".join(axes[a][0].name for a in open_axes)
             other = axes[next(iter(own))][0].name
-            findings.append(
-                Finding(
-                    "io.unit-taken-from-other-axis",
-                    file=record.path.name,
-                    quantity="unit",
-                    without=without,
-                    wanted=wanted,
-                    other=other,
-                )
+            add_warning(
+                findings,
+                "io.unit-taken-from-other-axis",
+                file=record.path.name,
+                quantity="unit",
+                without=without,
+                wanted=wanted,
+                other=other,
             )
         else:
             wanted = _evident(record, axes, time, kind, findings)
     for axis in open_axes:
         channel = axes[axis][0]
         if channel.unit:
-            findings.append(
-                Finding(
-                    "io.record-says-not-known-read",
-                    file=channel.file or None,
-                    quantity=f"channel {channel.name}",
-                    severity="note",
-                    unit=channel.unit,
-                    wanted=wanted,
-                )
+            add_note(
+                findings,
+                "io.record-says-not-known-read",
+                file=channel.file or None,
+                quantity=f"channel {channel.name}",
+                unit=channel.unit,
+                wanted=wanted,
             )
     return {a: 1.0 if a in own else FACTORS[kind][wanted] for a in axes}, wanted
 

@@ -20,7 +20,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats.arrays import is_date, is_day_time, is_stamp
 from strapdown.formats.columns import read_name, split_brackets
 from strapdown.formats.preamble import stated_by_keys, stated_rate, stated_units
@@ -670,9 +670,7 @@ def _whole_lines(
     for k, (row, line) in enumerate(numbered):
         last = k == len(numbered) - 1
         if last and k and _was_cut(line, numbered[max(0, k - 20) : k], top, ended):
-            findings.append(
-                Finding("io.last-line-cut-left-out", severity="note", file=name, row=row)
-            )
+            add_note(findings, "io.last-line-cut-left-out", file=name, row=row)
             break
         count = _count(line, separator)
         bare = line.rstrip(" \r\n")
@@ -706,15 +704,13 @@ def _whole_lines(
         if not rows:  # its separator is not that of the header
             count = _count(line, separator)
             raise DataError("io.csv-field-count", file=name, row=row, count=count, width=width)
-        findings.append(
-            Finding(
-                "io.comments-among-rows",
-                file=name,
-                row=row,
-                severity="note",
-                count=len(amid),
-                first=line.strip()[:60],
-            )
+        add_note(
+            findings,
+            "io.comments-among-rows",
+            file=name,
+            row=row,
+            count=len(amid),
+            first=line.strip()[:60],
         )
     return rows, lines
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import hdf5
 from strapdown.formats.arrays import raw_log
 from strapdown.formats.assemble import LOST
@@ -124,14 +124,12 @@ def read_ronin(path: Path) -> RawLog:
         if name in arrays:
             stated |= {f"{name}[{k}]": (f"{triad}_{a}", unit) for k, a in enumerate("xyz")}
     if CHEST in hdf5.outline(path)[0]:
-        raw.findings.append(
-            Finding(
-                "io.attitude-of-other-phone",
-                file=path.name,
-                quantity="attitude",
-                severity="note",
-                name=CHEST,
-            )
+        add_note(
+            raw.findings,
+            "io.attitude-of-other-phone",
+            file=path.name,
+            quantity="attitude",
+            name=CHEST,
         )
     raw.stated, raw.axes = stated, AXES
     return raw
@@ -199,13 +197,8 @@ def _accel_columns(
         accel = np.column_stack(
             [time] + [np.interp(time, accel[order, 0], accel[order, k]) for k in (1, 2, 3)]
         )
-        findings.append(
-            Finding(
-                "io.interpolated-stamps-gyro-not-own-2",
-                file=ACCEL_FILE,
-                quantity="accel",
-                severity="note",
-            )
+        add_note(
+            findings, "io.interpolated-stamps-gyro-not-own-2", file=ACCEL_FILE, quantity="accel"
         )
     return {f"accel[{k}]": accel[:, k + 1] for k in range(3)}
 
@@ -224,15 +217,13 @@ def _buffer(path: Path, name: str, findings: list[Finding]) -> NDArray[Any]:
     used = np.flatnonzero((rows != 0).any(axis=1))
     end = int(used[-1]) + 1 if used.size else 0
     if end < len(rows):
-        findings.append(
-            Finding(
-                "io.last-rows-all-zero-tail",
-                file=path.name,
-                row=end + 1,
-                severity="note",
-                count=len(rows) - end,
-                count_2=len(rows),
-            )
+        add_note(
+            findings,
+            "io.last-rows-all-zero-tail",
+            file=path.name,
+            row=end + 1,
+            count=len(rows) - end,
+            count_2=len(rows),
         )
     return np.asarray(rows[:end], dtype=np.float64)
 
@@ -272,9 +263,7 @@ def read_smartloc(path: Path) -> RawLog:
     log = stated_by(raw, held, clock=GPS)
     epochs = held["time"][0] + 604_800.0 * held["week"][0]
     log = selected(log, np.diff(epochs, prepend=-np.inf) != 0.0)
-    log.findings.append(
-        Finding("io.smartloc-reference", file=path.name, quantity="lat, lon, alt", severity="note")
-    )
+    add_note(log.findings, "io.smartloc-reference", file=path.name, quantity="lat, lon, alt")
     return log
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, add_note, check_choice
 from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock
@@ -216,15 +216,13 @@ def _place(
 def _height(found: dict[str, Found], values: Callable[[str], Array], raw: RawLog) -> Array:
     if "alt_msl" not in found or "geoid" not in found:
         return values(next(q for q in _HEIGHTS if q in found))
-    raw.findings.append(
-        Finding(
-            "io.height-over-ellipsoid-over-sea",
-            file=raw.name,
-            quantity="alt",
-            severity="note",
-            source=found["alt_msl"].source,
-            source_2=found["geoid"].source,
-        )
+    add_note(
+        raw.findings,
+        "io.height-over-ellipsoid-over-sea",
+        file=raw.name,
+        quantity="alt",
+        source=found["alt_msl"].source,
+        source_2=found["geoid"].source,
     )
     return np.asarray(values("alt_msl") + values("geoid"))
 
@@ -275,15 +273,13 @@ def _over_ground(
     never = not known.any()
     speed = np.where(known, speed, np.nan)
     angle, none = np.radians(course), np.full(speed.size, np.nan)
-    raw.findings.append(
-        Finding(
-            "io.speed-and-course-never-known" if never else "io.velocity-by-speed-and-course",
-            severity="note",
-            file=raw.name,
-            quantity=", ".join(VELOCITY),
-            source=found["speed"].source,
-            source_2=found["course"].source,
-        )
+    add_note(
+        raw.findings,
+        "io.speed-and-course-never-known" if never else "io.velocity-by-speed-and-course",
+        file=raw.name,
+        quantity=", ".join(VELOCITY),
+        source=found["speed"].source,
+        source_2=found["course"].source,
     )
     if never:
         return None, None
@@ -298,14 +294,12 @@ def _over_ground(
 def _sd_of_speed(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]) -> Array:
     """Return the accuracy of the speed as the standard deviation of each part of the velocity."""
     stated = values("speed_sd")
-    raw.findings.append(
-        Finding(
-            "io.velocity-sd-by-speed",
-            severity="note",
-            file=raw.name,
-            quantity=", ".join(VELOCITY_SD),
-            source=found["speed_sd"].source,
-        )
+    add_note(
+        raw.findings,
+        "io.velocity-sd-by-speed",
+        file=raw.name,
+        quantity=", ".join(VELOCITY_SD),
+        source=found["speed_sd"].source,
     )
     return np.column_stack([np.where(stated > 0.0, stated, np.nan)] * 3)
 
@@ -376,15 +370,13 @@ def _accuracy(raw: RawLog, found: dict[str, Found], values: Callable[[str], Arra
         vertical = np.where(down > 0.0, down, np.nan)
     else:
         vertical = UNSTATED_VERTICAL * horizontal
-    raw.findings.append(
-        Finding(
-            "io.sd-by-accuracy",
-            severity="note",
-            file=raw.name,
-            quantity=", ".join(POSITION_SD),
-            source=found["horizontal_accuracy"].source,
-            unstated_vertical=None if "vertical_accuracy" in found else UNSTATED_VERTICAL,
-        )
+    add_note(
+        raw.findings,
+        "io.sd-by-accuracy",
+        file=raw.name,
+        quantity=", ".join(POSITION_SD),
+        source=found["horizontal_accuracy"].source,
+        unstated_vertical=None if "vertical_accuracy" in found else UNSTATED_VERTICAL,
     )
     return np.column_stack([horizontal, horizontal, vertical])
 
@@ -412,16 +404,14 @@ def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
         by_date = [u for u in ("ms", "us", "ns") if _DATES[0] < first * TIME_UNITS[u] < _DATES[1]]
         unit = (fits or by_date or ["ms"])[0]
         if len(fits) == 1 and _DATES[0] < first * TIME_UNITS[unit] < _DATES[1]:
-            raw.findings.append(
-                Finding(
-                    "io.time-unit-by-date",
-                    severity="note",
-                    file=raw.name,
-                    quantity="time",
-                    unit=unit,
-                    year=1970.0 + np.floor(first * TIME_UNITS[unit] / 31556952.0),
-                    step=step * TIME_UNITS[unit],
-                )
+            add_note(
+                raw.findings,
+                "io.time-unit-by-date",
+                file=raw.name,
+                quantity="time",
+                unit=unit,
+                year=1970.0 + np.floor(first * TIME_UNITS[unit] / 31556952.0),
+                step=step * TIME_UNITS[unit],
             )
             return time * TIME_UNITS[unit], Clock(name)
         raise DataError(
@@ -449,14 +439,12 @@ def _quality(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array
         raise DataError(
             "io.solution-kind-unknown", file=raw.name, row=raw.row(k), quantity="Q", codes=codes[k]
         )
-    raw.findings.append(
-        Finding(
-            "io.column-taken-codes-rtklib-fix",
-            severity="note",
-            file=raw.name,
-            quantity="quality",
-            source=found["Q"].source,
-        )
+    add_note(
+        raw.findings,
+        "io.column-taken-codes-rtklib-fix",
+        file=raw.name,
+        quantity="quality",
+        source=found["Q"].source,
     )
     return np.array([QUALITY[int(q)] for q in codes], dtype=np.float64)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.arrays import told_by_file_rows
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
 from strapdown.tables import gnss_table
@@ -146,13 +146,11 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     if fixes.position_sd is None and asked is None and options.unstated_position_sd is not None:
         asked = taken["position_sd_taken"] = options.unstated_position_sd
         if np.isinf(asked).all():
-            fixes.findings.append(
-                Finding(
-                    "io.position-sd-not-stated",
-                    severity="warning",
-                    file=fixes.name,
-                    quantity=", ".join(POSITION_SD),
-                )
+            add_warning(
+                fixes.findings,
+                "io.position-sd-not-stated",
+                file=fixes.name,
+                quantity=", ".join(POSITION_SD),
             )
     position_sd = _sd(fixes, "position", asked, count)
     if fixes.heights_from == NOWHERE:
@@ -241,15 +239,14 @@ def _sd_of_stated_height(fixes: Fixes, asked: Sd | None, options: GnssOptions, c
     """
     sd = STATED_HEIGHT_SD if asked is None or np.ndim(asked) == 0 else float(np.asarray(asked)[2])
     used = sd * float(np.sqrt(count))
-    fixes.findings.append(
-        Finding(
-            "io.fixes-with-stated-height",
-            file=fixes.name,
-            quantity="alt",
-            height=options.datum_height,
-            sd=sd,
-            used=used,
-        )
+    add_warning(
+        fixes.findings,
+        "io.fixes-with-stated-height",
+        file=fixes.name,
+        quantity="alt",
+        height=options.datum_height,
+        sd=sd,
+        used=used,
     )
     return used
 
@@ -278,14 +275,12 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
         time = np.asarray(whole)
         if weeks:
             row = int(fixes.rows[np.flatnonzero(keep)[weeks[0]]])
-            fixes.findings.append(
-                Finding(
-                    "io.seconds-of-week-unrolled",
-                    file=fixes.name,
-                    row=row,
-                    quantity="time",
-                    severity="note",
-                )
+            add_note(
+                fixes.findings,
+                "io.seconds-of-week-unrolled",
+                file=fixes.name,
+                row=row,
+                quantity="time",
             )
     for at, size in options.clock_steps:
         time = np.where(time >= at, time - size, time)
@@ -330,15 +325,7 @@ def _placed(fixes: Fixes, quality: Array, options: GnssOptions) -> NDArray[np.bo
 def _say_left_out(fixes: Fixes, keep: NDArray[np.bool_], code: str) -> None:
     out = np.flatnonzero(~keep)
     if out.size:
-        fixes.findings.append(
-            Finding(
-                code,
-                file=fixes.name,
-                row=int(fixes.rows[out[0]]),
-                severity="note",
-                count=out.size,
-            )
-        )
+        add_note(fixes.findings, code, file=fixes.name, row=int(fixes.rows[out[0]]), count=out.size)
 
 
 def _velocity(fixes: Fixes, asked: Sd | None, count: int) -> tuple[Array, Array]:
@@ -357,12 +344,11 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
         return np.broadcast_to(np.asarray(asked, dtype=np.float64), (count, 3)).copy()
     if stated is None:
         if what == "velocity":
-            fixes.findings.append(
-                Finding(
-                    "io.velocity-sd-not-stated",
-                    file=fixes.name,
-                    quantity=", ".join(VELOCITY),
-                )
+            add_warning(
+                fixes.findings,
+                "io.velocity-sd-not-stated",
+                file=fixes.name,
+                quantity=", ".join(VELOCITY),
             )
             return np.full((count, 3), np.inf)
         raise DataError("io.position-sd-not-stated", file=fixes.name, quantity=", ".join(names))
@@ -370,15 +356,14 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
     zero = sd == 0.0
     if fixes.zero_is_unknown and zero.any():
         rows = np.flatnonzero(zero.any(axis=1))
-        fixes.findings.append(
-            Finding(
-                "io.sd-of-zero-unknown",
-                file=fixes.name,
-                row=int(fixes.rows[rows[0]]),
-                quantity=names[int(np.argmax(zero[rows[0]]))],
-                count=rows.size,
-                of=what,
-            )
+        add_warning(
+            fixes.findings,
+            "io.sd-of-zero-unknown",
+            file=fixes.name,
+            row=int(fixes.rows[rows[0]]),
+            quantity=names[int(np.argmax(zero[rows[0]]))],
+            count=rows.size,
+            of=what,
         )
         sd = np.where(zero, np.inf, sd)
     bad = np.argwhere(~(sd > 0.0))

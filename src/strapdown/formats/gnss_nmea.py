@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.gnss_fixes import Fixes
@@ -93,15 +93,7 @@ def read(path: Path) -> Fixes:
     if not fixed:
         raise DataError("io.holds-no-gga-sentence-whole", file=path.name)
     if wrong:
-        findings.append(
-            Finding(
-                "io.nmea-lines-left-out",
-                file=path.name,
-                row=wrong[0],
-                severity="note",
-                count=len(wrong),
-            )
-        )
+        add_note(findings, "io.nmea-lines-left-out", file=path.name, row=wrong[0], count=len(wrong))
     time, clock = _times(fixed)
     sd = np.array([e.sd for e in fixed])
     placed = [e for e in fixed if np.isfinite(e.place[2])]

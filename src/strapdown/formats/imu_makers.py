@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import GPS, UNIX, WEEK, usual_step
@@ -96,14 +96,13 @@ def _of_monitors(
     """State the columns of each monitor; `gyro`: behind the name of one, its rates."""
     raw.stated, *raw.other_units = stated
     if len(names) > 1:
-        raw.findings.append(
-            Finding(
-                "io.first-of-monitors",
-                file=raw.name,
-                quantity="gyro",
-                monitors=names,
-                other=f"{names[1]}{gyro}",
-            )
+        add_warning(
+            raw.findings,
+            "io.first-of-monitors",
+            file=raw.name,
+            quantity="gyro",
+            monitors=names,
+            other=f"{names[1]}{gyro}",
         )
     return raw
 
@@ -364,9 +363,7 @@ def read_xsens(path: Path) -> RawLog:
     }
     findings = list(raw.findings)
     if "Mag_X" in raw.columns:
-        findings.append(
-            Finding("io.xsens-mag-not-used", file=path.name, quantity="mag", severity="note")
-        )
+        add_note(findings, "io.xsens-mag-not-used", file=path.name, quantity="mag")
     columns = dict(raw.columns)
     source, stamps = _stamps(raw, rate, findings)
     if source is not None:
@@ -391,29 +388,25 @@ def _stamps(
         ticks = _unwrapped(raw, STAMP, (32,), findings)
         tick = 1 if _is_of_dot(raw) else _tick(raw, ticks, rate or _rate_by_other_clock(raw))
         if tick != 1:
-            findings.append(
-                Finding(
-                    "io.xsens-tick",
-                    file=raw.name,
-                    quantity="time",
-                    severity="note",
-                    column=STAMP,
-                    tick_us=tick,
-                )
+            add_note(
+                findings,
+                "io.xsens-tick",
+                file=raw.name,
+                quantity="time",
+                column=STAMP,
+                tick_us=tick,
             )
         return STAMP, ticks * tick
     if rate is None or COUNTER not in raw.columns:
         return None, np.empty(0)
     count = _unwrapped(raw, COUNTER, (16, 32), findings)
-    findings.append(
-        Finding(
-            "io.stamps-over-hz-top-file",
-            file=raw.name,
-            quantity="time",
-            severity="note",
-            counter=COUNTER,
-            rate=rate,
-        )
+    add_note(
+        findings,
+        "io.stamps-over-hz-top-file",
+        file=raw.name,
+        quantity="time",
+        counter=COUNTER,
+        rate=rate,
     )
     return COUNTER, np.asarray((count - count[0]) * (1e6 / rate))
 
@@ -456,17 +449,15 @@ def _unwrapped(
             falls = np.flatnonzero(steps < -(2 ** (bits - 1)))
             if falls.size:
                 count[1:] += np.cumsum(steps < -(2 ** (bits - 1))) * 2**bits
-                findings.append(
-                    Finding(
-                        "io.wrapped-bits-all-undone",
-                        file=raw.name,
-                        row=raw.row(int(falls[0]) + 1),
-                        quantity="time",
-                        severity="note",
-                        name=name,
-                        bits=bits,
-                        size=falls.size,
-                    )
+                add_note(
+                    findings,
+                    "io.wrapped-bits-all-undone",
+                    file=raw.name,
+                    row=raw.row(int(falls[0]) + 1),
+                    quantity="time",
+                    name=name,
+                    bits=bits,
+                    size=falls.size,
                 )
             break
     return count

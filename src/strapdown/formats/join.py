@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.find_columns import Column, find_columns
 from strapdown.formats.inference.conclusion import infer_time_unit
@@ -88,15 +88,13 @@ def join(
                 columns[source] = values[:, j]
                 stated[source] = (f"{triad}_{a}", column.unit)
     if lost := int((~keep).sum()):
-        findings.append(
-            Finding(
-                "io.rows-left-out-another-sensor",
-                file=gyro.name,
-                row=gyro.row(int(np.argmin(keep))),
-                severity="note",
-                lost=lost,
-                size=keep.size,
-            )
+        add_note(
+            findings,
+            "io.rows-left-out-another-sensor",
+            file=gyro.name,
+            row=gyro.row(int(np.argmin(keep))),
+            lost=lost,
+            size=keep.size,
         )
     everything = tuple(dict.fromkeys(f for log in logs for f in log.files))
     rows = np.arange(1, keep.size + 1) if gyro.rows is None else gyro.rows
@@ -210,9 +208,7 @@ def _onto(
     if stamps.size == time.size and np.array_equal(stamps, time):
         return values, np.ones(time.size, dtype=bool)
     if not stamps.size or not known.any():
-        findings.append(
-            Finding("io.left-out-without-number", file=log.name, quantity=triad, severity="note")
-        )
+        add_note(findings, "io.left-out-without-number", file=log.name, quantity=triad)
         return None, known
     out, inside, distance = at_stamps(time, stamps, values)
     if not inside.any():
@@ -227,39 +223,34 @@ def _onto(
         )
     covered = int(inside.sum())
     if covered < COVERED * known.sum():
-        findings.append(
-            Finding(
-                "io.left-out-few-samples",
-                file=log.name,
-                quantity=triad,
-                severity="note",
-                covered=covered,
-                count=int(known.sum()),
-            )
+        add_note(
+            findings,
+            "io.left-out-few-samples",
+            file=log.name,
+            quantity=triad,
+            covered=covered,
+            count=int(known.sum()),
         )
         return None, known
     if distance > 0:
-        findings.append(
-            Finding(
-                "io.interpolated-stamps-gyro-not-own",
-                file=log.name,
-                quantity=triad,
-                severity="note",
-                covered=covered,
-                distance=distance * factor,
-            )
+        add_note(
+            findings,
+            "io.interpolated-stamps-gyro-not-own",
+            file=log.name,
+            quantity=triad,
+            covered=covered,
+            distance=distance * factor,
         )
     if gaps := find_gaps(stamps):
         longest = max(gaps, key=lambda g: g.length)
-        findings.append(
-            Finding(
-                "io.gaps-in-force" if triad == "accel" else "io.gaps-in-sensor",
-                severity="warning" if triad == "accel" else "note",
-                file=log.name,
-                quantity=triad,
-                count=len(gaps),
-                length=longest.length * factor,
-            )
+        add_warning(
+            findings,
+            "io.gaps-in-force" if triad == "accel" else "io.gaps-in-sensor",
+            severity="warning" if triad == "accel" else "note",
+            file=log.name,
+            quantity=triad,
+            count=len(gaps),
+            length=longest.length * factor,
         )
     # A gyro stamp that is not a number is refused or repaired together with the gyro.
     return np.where(known[:, None], out, 0.0), inside | ~known
@@ -273,15 +264,13 @@ def _in_order(
     order = np.flatnonzero(use)[np.argsort(stamps[use], kind="stable")]
     order = order[np.diff(stamps[order], prepend=-np.inf) > 0]
     if lost := stamps.size - order.size:
-        findings.append(
-            Finding(
-                "io.samples-not-used-no-number",
-                file=name,
-                quantity=triad,
-                severity="note",
-                lost=lost,
-                size=stamps.size,
-            )
+        add_note(
+            findings,
+            "io.samples-not-used-no-number",
+            file=name,
+            quantity=triad,
+            lost=lost,
+            size=stamps.size,
         )
     return stamps[order], values[order]
 

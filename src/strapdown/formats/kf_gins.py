@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers, told_by_file_rows
 from strapdown.formats.clocks import GPS, WEEK, Clock, clock_of, unrolled, with_clock
@@ -129,14 +129,13 @@ def _axes(columns: dict[str, NDArray[np.float64]], raw: RawLog) -> str | None:
         return None
     down = float(np.median(columns["dv_z"])) / step
     told = down < -0.5 * _GRAVITY[0]
-    raw.findings.append(
-        Finding(
-            "io.taken-for-kf-gins" if told else "io.taken-for-kf-gins-axes-open",
-            file=raw.name,
-            severity="note" if told else "warning",
-            rate_hz=1.0 / step,
-            down=down,
-        )
+    add_warning(
+        raw.findings,
+        "io.taken-for-kf-gins" if told else "io.taken-for-kf-gins-axes-open",
+        file=raw.name,
+        severity="note" if told else "warning",
+        rate_hz=1.0 / step,
+        down=down,
     )
     return "x,y,z" if told else None
 
@@ -197,15 +196,13 @@ def fixes_of(raw: RawLog, names: tuple[str, ...]) -> Fixes:
     def block(first: int) -> np.ndarray:
         return np.column_stack([values[n] for n in names[first : first + 3]])
 
-    raw.findings.append(
-        Finding(
-            "io.taken-for-kf-gins-fixes-with-velocity"
-            if len(names) > len(NAMES)
-            else "io.taken-for-kf-gins-fixes",
-            file=raw.name,
-            severity="note",
-            count=len(names),
-        )
+    add_note(
+        raw.findings,
+        "io.taken-for-kf-gins-fixes-with-velocity"
+        if len(names) > len(NAMES)
+        else "io.taken-for-kf-gins-fixes",
+        file=raw.name,
+        count=len(names),
     )
     return Fixes(
         name=raw.name,
@@ -426,7 +423,7 @@ def _seconds_of_week(
     stamps, week, findings = gps_ns(table, options, "KF-GINS")
     if week is not None:
         source = table.attrs.get("source")
-        findings.append(Finding("io.written-without-week", file=source, severity="note", week=week))
+        add_note(findings, "io.written-without-week", file=source, week=week)
     return stamps % int(WEEK * SECOND), findings
 
 
@@ -441,7 +438,7 @@ def _write_increments(path: Path, imu: pd.DataFrame, options: FileOptions) -> li
         sums = 0.5 * (values[1:] + values[:-1]) * np.diff(time)[:, None]
         stamps = stamps[1:]
         source = imu.attrs.get("source")
-        findings.append(Finding("io.written-increments-of-line", file=source, severity="note"))
+        add_note(findings, "io.written-increments-of-line", file=source)
     if MAG[0] in imu.columns:
         findings.append(not_held("KF-GINS", "imu", "the magnetic field", imu))
     findings += mark_not_held("KF-GINS", imu)
@@ -458,7 +455,7 @@ def _write_fixes(path: Path, gnss: pd.DataFrame, options: FileOptions) -> list[F
         raise DataError("io.written-needs-position-sd", file=source, form="KF-GINS")
     if not keep.all():
         data = {"count": int((~keep).sum()), "rows": keep.size}
-        findings.append(Finding("io.written-fixes-without-sd", file=source, data=data))
+        add_warning(findings, "io.written-fixes-without-sd", file=source, data=data)
     velocity_sd = values_of(gnss, VELOCITY_SD)[keep]
     names = list(WITH_VELOCITY[1:])
     if not (np.isfinite(velocity_sd) & (velocity_sd > 0.0)).all():

@@ -30,7 +30,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, add_note
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.gnss_fixes import RADIUS, UNSTATED_VERTICAL, Fixes
 from strapdown.formats.known_formats import lacking
@@ -183,9 +183,7 @@ def read(path: Path) -> RawLog:
     log.sparse = frozenset({"mag"})
     if streams.unused:
         said = [f"{count} {reason}" for reason, count in sorted(streams.unused.items())]
-        log.findings.append(
-            Finding("io.session-events-not-used", file=name, severity="note", said=said)
-        )
+        add_note(log.findings, "io.session-events-not-used", file=name, said=said)
     return log
 
 

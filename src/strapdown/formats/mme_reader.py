@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
 from strapdown.formats.crash_record import (
     CHANGE_NOTE,
@@ -49,16 +49,14 @@ def read(path: Path) -> CrashRecord:
     absent = [n for n in listed if n not in numbered]
     if absent:
         shown = ", ".join(f"{n:03d}" for n in absent[:12]) + (" …" if len(absent) > 12 else "")
-        findings.append(
-            Finding(
-                "io.listed-channels-not-folder",
-                severity="note",
-                file=index.name if index else head.name,
-                quantity="channels",
-                count=len(absent),
-                count_2=len(listed),
-                value_shown=shown,
-            )
+        add_note(
+            findings,
+            "io.listed-channels-not-folder",
+            file=index.name if index else head.name,
+            quantity="channels",
+            count=len(absent),
+            count_2=len(listed),
+            value_shown=shown,
         )
     if not numbered:
         raise DataError("io.test-no-channel-files", file=head.name, quantity="channels")
@@ -112,14 +110,7 @@ def _index(head: Path, findings: list[Finding]) -> tuple[Path | None, dict[int, 
     ]
     same = [p for p in found if p.stem.lower() == head.stem.lower()] or found
     if not same:
-        findings.append(
-            Finding(
-                "io.no-index-channels-chn-files",
-                file=head.name,
-                quantity="channels",
-                severity="note",
-            )
-        )
+        add_note(findings, "io.no-index-channels-chn-files", file=head.name, quantity="channels")
         return None, {}
     index = same[0]
     if not _inside(index, head):
@@ -133,15 +124,14 @@ def _index(head: Path, findings: list[Finding]) -> tuple[Path | None, dict[int, 
     }
     promised = header.number("number of channels")
     if promised is not None and promised != len(listed):
-        findings.append(
-            Finding(
-                "io.promises-channels-lists",
-                file=index.name,
-                row=header.line("number of channels"),
-                quantity="number of channels",
-                promised=promised,
-                count=len(listed),
-            )
+        add_warning(
+            findings,
+            "io.promises-channels-lists",
+            file=index.name,
+            row=header.line("number of channels"),
+            quantity="number of channels",
+            promised=promised,
+            count=len(listed),
         )
     return index, listed
 
@@ -210,14 +200,13 @@ def _vehicles(header: MmeHeader, findings: list[Finding]) -> dict[str, dict[str,
         except DataError as error:
             # Unusable data of the vehicle only affects the report: keep the record.
             fault = error.finding
-            findings.append(
-                Finding(
-                    "io.left-out-unusable",
-                    file=fault.file,
-                    row=fault.row,
-                    quantity=fault.quantity,
-                    reason=fault,
-                )
+            add_warning(
+                findings,
+                "io.left-out-unusable",
+                file=fault.file,
+                row=fault.row,
+                quantity=fault.quantity,
+                reason=fault,
             )
     return vehicles
 
@@ -296,47 +285,42 @@ def _told(file: MmeFile, listed: dict[int, str]) -> list[Finding]:
     name = clean(file.path.name, LONGEST_NAME)
     number = int(file.path.suffix[1:])
     if file.known is None:
-        told.append(
-            Finding(
-                "io.channel-code-malformed" if file.code else "io.channel-code-missing",
-                file=name,
-                row=file.header.line("channel code"),
-                quantity="channel code",
-                word=file.code,
-            )
+        add_warning(
+            told,
+            "io.channel-code-malformed" if file.code else "io.channel-code-missing",
+            file=name,
+            row=file.header.line("channel code"),
+            quantity="channel code",
+            word=file.code,
         )
     elif not file.known.listed and file.known.body == "vehicle" and _moves(file.known):
-        told.append(
-            Finding(
-                "io.location-code-unknown",
-                severity="note",
-                file=name,
-                row=file.header.line("channel code"),
-                quantity=f"channel {file.code}",
-                word=file.code[2:6],
-            )
+        add_note(
+            told,
+            "io.location-code-unknown",
+            file=name,
+            row=file.header.line("channel code"),
+            quantity=f"channel {file.code}",
+            word=file.code[2:6],
         )
     if is_bad(file):
-        told.append(
-            Finding(
-                "io.laboratory-gives-status",
-                file=name,
-                row=file.header.line("data status"),
-                quantity=f"channel {file.code or name}",
-                text=file.header.text("data status"),
-            )
+        add_warning(
+            told,
+            "io.laboratory-gives-status",
+            file=name,
+            row=file.header.line("data status"),
+            quantity=f"channel {file.code or name}",
+            text=file.header.text("data status"),
         )
     indexed = listed.get(number, "")
     if indexed and file.code and indexed.upper() != file.code.upper():
-        told.append(
-            Finding(
-                "io.index-file-says-taken",
-                file=name,
-                row=file.header.line("channel code"),
-                quantity="channel code",
-                indexed=indexed,
-                word=file.code,
-            )
+        add_warning(
+            told,
+            "io.index-file-says-taken",
+            file=name,
+            row=file.header.line("channel code"),
+            quantity="channel code",
+            indexed=indexed,
+            word=file.code,
         )
     return told
 

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats.crash_record import header_of
 from strapdown.units import FACTORS, SPEEDS, TIME_UNITS, find_unit, si_of
 
@@ -250,16 +250,14 @@ def _findings(channels: tuple[Channel, ...], file: Path) -> list[Finding]:
     findings = []
     absent = [c.number for c in channels if not c.present]
     if absent:
-        findings.append(
-            Finding(
-                "io.listed-channels-not-folder-2",
-                severity="note",
-                file=file.name,
-                quantity="channels",
-                count=len(absent),
-                count_2=len(channels),
-                ranges=_ranges(absent),
-            )
+        add_note(
+            findings,
+            "io.listed-channels-not-folder-2",
+            file=file.name,
+            quantity="channels",
+            count=len(absent),
+            count_2=len(channels),
+            ranges=_ranges(absent),
         )
     findings += [
         Finding(

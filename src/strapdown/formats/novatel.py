@@ -34,7 +34,7 @@ import pandas as pd
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK, Clock
 from strapdown.formats.known_formats import Quantities, damage, solution
@@ -199,7 +199,7 @@ def _read(path: Path, stream: str) -> tuple[Frames, list[Finding]]:
         frames, lost = _frames(path.read_bytes())
     findings: list[Finding] = []
     if lost:
-        findings.append(Finding("io.bytes-left-out", file=path.name, severity="note", count=lost))
+        add_note(findings, "io.bytes-left-out", file=path.name, count=lost)
     if not any(kind in frames for kind in STREAMS[stream]):
         if stream == "imu" and any(kind in frames for kind in CORRECTED):
             raise DataError("io.novatel-corrected-only", file=path.name, quantity="imu")
@@ -249,13 +249,13 @@ def read_fixes(path: Path) -> RawLog:
     kept = [r for r in rows if r[1] == 0 and r[2] != 0]
     if len(kept) < len(rows):
         code, count = "io.fixes-without-position-left-out", len(rows) - len(kept)
-        findings.append(Finding(code, file=path.name, severity="note", count=count))
+        add_note(findings, code, file=path.name, count=count)
     if not kept:
         raise DataError("io.no-usable-fix", file=path.name, quantity="lat, lon")
     table = np.array(kept, dtype=np.float64)
     if count := int(np.isin(table[:, 2], FUSED).sum()):
         code = "io.fixes-of-fused-receiver"
-        findings.append(Finding(code, file=path.name, severity="note", count=count))
+        add_note(findings, code, file=path.name, count=count)
     stamps = np.array([r[0] for r in kept], dtype=np.int64)
     time, week = stamps % WEEK_MS, stamps // WEEK_MS
     out: Quantities = {"time": (time, "ms"), "week": (week, None)}
@@ -272,7 +272,7 @@ def read_fixes(path: Path) -> RawLog:
         late = max((v[2] for v in velocities.values()), default=0.0)
         if late > 0.0:
             code = "io.velocity-late"
-            findings.append(Finding(code, file=path.name, severity="note", late=late))
+            add_note(findings, code, file=path.name, late=late)
         out |= {f"V{a}": (ned[:, k], "m/s") for k, a in enumerate("NED")}
     return RawLog.of(path, out, clock=GPS, findings=findings)
 

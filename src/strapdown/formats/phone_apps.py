@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, add_note
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.columns import read_name
@@ -98,16 +98,14 @@ def read_core_motion(path: Path) -> RawLog:
         held[f"gyro_{axis}"] = (gyro[:, k], "rad/s")
         held[f"accel_{axis}"] = (gravity[:, k] + user[:, k], unit)
     log = stated_by(raw, held, axes=AXES)
-    log.findings.append(
-        Finding(
-            "io.force-summed",
-            file=path.name,
-            quantity="accel",
-            severity="note",
-            linear=named["user_x"],
-            gravity=named["gravity_x"],
-            distance=0.0,
-        )
+    add_note(
+        log.findings,
+        "io.force-summed",
+        file=path.name,
+        quantity="accel",
+        linear=named["user_x"],
+        gravity=named["gravity_x"],
+        distance=0.0,
     )
     return log
 
@@ -143,14 +141,12 @@ def read_physics_toolbox(path: Path) -> RawLog:
         )
     log = stated_by(raw, {"time": (_time(raw), "s"), **held}, axes=AXES, clock=RELATIVE)
     if "ax" in raw.columns:
-        log.findings.append(
-            Finding(
-                "io.linear-acceleration-not-used",
-                file=path.name,
-                quantity="accel",
-                severity="note",
-                source="ax, ay, az",
-            )
+        add_note(
+            log.findings,
+            "io.linear-acceleration-not-used",
+            file=path.name,
+            quantity="accel",
+            source="ax, ay, az",
         )
     return log
 

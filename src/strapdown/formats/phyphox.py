@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_warning
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE
 from strapdown.formats.columns import read_name
@@ -190,8 +190,11 @@ def _mention_linear(logs: list[RawLog]) -> list[RawLog]:
     wanted = {f"{triad}_{a}" for triad in _TRIADS for a in XYZ}
     for log in logs:
         if not any(q in wanted for q, _ in log.stated.values()):
-            log.findings.append(
-                Finding("io.left-out-acceleration-without-gravity", file=log.name, quantity="accel")
+            add_warning(
+                log.findings,
+                "io.left-out-acceleration-without-gravity",
+                file=log.name,
+                quantity="accel",
             )
     return logs
 
@@ -208,14 +211,13 @@ def _pauses(member: Member) -> list[Finding]:
     out = []
     for k in range(1, len(events)):
         if events[k - 1] == "PAUSE" and events[k] == "START":
-            out.append(
-                Finding(
-                    "io.recording-paused",
-                    file=member.label,
-                    row=k + 2,
-                    quantity="time",
-                    wall=wall[k] - wall[k - 1],
-                    clock=clock[k],
-                )
+            add_warning(
+                out,
+                "io.recording-paused",
+                file=member.label,
+                row=k + 2,
+                quantity="time",
+                wall=wall[k] - wall[k - 1],
+                clock=clock[k],
             )
     return out

@@ -16,7 +16,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.earth import radii_of_curvature
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats.clocks import GPS, RELATIVE, WEEK, Clock, gps_from_unix
 from strapdown.formats.join import join
 from strapdown.formats.known_formats import Quantities, damage, solution
@@ -101,11 +101,11 @@ def _solved(path: Path, stream: str) -> tuple[list[Any], Quantities, list[Findin
     findings = []
     if lost := len(messages) - len(fixed):
         code = "io.fixes-without-position-left-out"
-        findings.append(Finding(code, file=path.name, severity="note", count=lost))
+        add_note(findings, code, file=path.name, count=lost)
     if any(m.fixType in (1, 4) for m in fixed):
         count = sum(m.fixType in (1, 4) for m in fixed)
         code = "io.fixes-of-fused-receiver"
-        findings.append(Finding(code, file=path.name, severity="note", count=count))
+        add_note(findings, code, file=path.name, count=count)
     times: Quantities = {"time": (tow, "ms")}
     if np.isfinite(week).all():
         times["week"] = (week, None)
@@ -337,7 +337,7 @@ def read_sbf_fixes(path: Path) -> RawLog:
     findings = []
     if lost := len(rows) - len(use):
         code = "io.fixes-without-position-left-out"
-        findings.append(Finding(code, file=path.name, severity="note", count=lost))
+        add_note(findings, code, file=path.name, count=lost)
     return RawLog.of(path, out, clock=GPS, findings=findings)
 
 
@@ -441,7 +441,7 @@ def read_sbet(path: Path) -> pd.DataFrame:
             raise DataError("io.sbet-velocity", file=path.name, quantity="velocity")
         if apart[1] < 0.5 * apart[0]:
             ned = plain
-            findings.append(Finding("io.sbet-north-east-down", file=path.name, severity="note"))
+            add_note(findings, "io.sbet-north-east-down", file=path.name)
     euler = np.degrees(np.column_stack([values[:, 7], values[:, 8], values[:, 9] - wander]))
     euler[:, 2] = (euler[:, 2] + 180.0) % 360.0 - 180.0
     clock = GPS if time.max() <= WEEK + 1.0 else RELATIVE

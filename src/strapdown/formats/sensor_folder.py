@@ -16,7 +16,7 @@ from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, add_note
 from strapdown.formats import csv
 from strapdown.formats.columns import read_name
 from strapdown.formats.find_columns import AXES, find_columns
@@ -67,7 +67,7 @@ def read(path: Path) -> RawLog:
         )
     raw = join([_log(m) for m in tables], name, rows_of_member=True)
     if others := [m.name for m in members if m.suffix in csv.SUFFIXES and m not in tables]:
-        raw.findings.append(Finding("io.tables-not-used", file=name, severity="note", names=others))
+        add_note(raw.findings, "io.tables-not-used", file=name, names=others)
     return raw
 
 

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
 from strapdown.formats.clocks import UNIX
 from strapdown.formats.join import join
@@ -286,13 +286,8 @@ def _log(sensor: RawLog, triad: str, unit: str | None) -> RawLog:
 def _gyro(sensors: dict[str, RawLog], findings: list[Finding]) -> RawLog:
     kind = next(k for k in GYROS if k in sensors)
     if kind == GYROS[1]:
-        findings.append(
-            Finding(
-                "io.uncalibrated-gyroscope-read",
-                file=sensors[kind].name,
-                quantity="gyro",
-                severity="note",
-            )
+        add_note(
+            findings, "io.uncalibrated-gyroscope-read", file=sensors[kind].name, quantity="gyro"
         )
     return _log(sensors[kind], "gyro", "rad/s")
 
@@ -319,21 +314,17 @@ def _force(
         logs = [_log(sensors[raw], "accel", "-g" if turned else unit)]
     else:
         if linear in sensors:
-            findings.append(
-                Finding(
-                    "io.left-out-without-gravity-no", file=sensors[linear].name, quantity="accel"
-                )
+            add_warning(
+                findings,
+                "io.left-out-without-gravity-no",
+                file=sensors[linear].name,
+                quantity="accel",
             )
         return []
     if not known:
-        findings.append(Finding("io.sensor-logger-platform-unknown", file=name, quantity="accel"))
+        add_warning(findings, "io.sensor-logger-platform-unknown", file=name, quantity="accel")
     elif turned:
-        findings.append(
-            Finding(
-                "io.written-ios-without-standardised-frames",
-                file=name,
-                quantity="accel",
-                severity="note",
-            )
+        add_note(
+            findings, "io.written-ios-without-standardised-frames", file=name, quantity="accel"
         )
     return logs

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, add_note
 from strapdown.formats.csv import SUFFIXES, decoded
 from strapdown.formats.join import join
 from strapdown.formats.known_formats import force_of, sensor_log
@@ -70,9 +70,7 @@ def read(path: Path) -> RawLog:
         parsed = blocks_of(line)
         if parsed is None:
             if k == len(numbered) - 1 and k and not text.endswith(("\n", "\r")):
-                findings.append(
-                    Finding("io.last-line-cut-left-out-2", file=path.name, row=row, severity="note")
-                )
+                add_note(findings, "io.last-line-cut-left-out-2", file=path.name, row=row)
                 break
             raise DataError(
                 "io.not-stamp-blocks-id-values", file=path.name, row=row, value_shown=_shown(line)
@@ -84,15 +82,13 @@ def read(path: Path) -> RawLog:
             "io.no-line-gyroscope-id-ids", file=path.name, quantity="gyro", seen=sorted(seen)
         )
     if without := len(numbered) - len(seen[4]):
-        findings.append(
-            Finding(
-                "io.lines-no-gyroscope-no-samples",
-                file=path.name,
-                quantity="gyro",
-                severity="note",
-                without=without,
-                count=len(numbered),
-            )
+        add_note(
+            findings,
+            "io.lines-no-gyroscope-no-samples",
+            file=path.name,
+            quantity="gyro",
+            without=without,
+            count=len(numbered),
         )
     logs = [_log(path, seen, kind, *TRIADS[kind]) for kind in (4, 3, 5) if kind in seen]
     if 3 not in seen and {82, 83} <= set(seen):

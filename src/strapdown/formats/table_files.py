@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.android_events import joined, kind_of
 from strapdown.formats.arrays import raw_log
@@ -56,9 +56,7 @@ def read_excel(path: Path) -> RawLog:
     raw = csv.parse(buffer.getvalue().encode(), path.name, (path,))
     if len(sheets) > 1:
         others = [n for n in sheets if n != name]
-        raw.findings.append(
-            Finding("io.sheet-read", file=path.name, severity="note", name=name, others=others)
-        )
+        add_note(raw.findings, "io.sheet-read", file=path.name, name=name, others=others)
     return raw
 
 
@@ -183,9 +181,7 @@ def _objects(path: Path) -> tuple[list[dict[str, Any]], list[int], list[Finding]
             one = json.loads(line)
         except (ValueError, RecursionError) as error:
             if row == len(lines) and objects and not text.endswith("\n"):
-                findings.append(
-                    Finding("io.last-line-cut-left-out", file=path.name, row=row, severity="note")
-                )
+                add_note(findings, "io.last-line-cut-left-out", file=path.name, row=row)
                 continue
             raise DataError("io.no-json", file=path.name, row=row, msg=str(error)) from None
         if not isinstance(one, dict):

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv, hdf5, table_files
 from strapdown.formats.clocks import RELATIVE, Clock, with_clock
 from strapdown.formats.columns import read_name
@@ -153,11 +153,7 @@ def _table(path: Path, kind: str) -> Path | None:
 def _first_of_gnss_ins_sim(path: Path, kind: str, findings: list[Finding]) -> Path | None:
     table, count = _table(path, kind), len(list(path.glob(f"{kind}-*.csv")))
     if table is not None and count > 1:
-        findings.append(
-            Finding(
-                "io.first-of-runs", file=table.name, quantity=kind, severity="note", count=count
-            )
-        )
+        add_note(findings, "io.first-of-runs", file=table.name, quantity=kind, count=count)
     return table
 
 
@@ -262,9 +258,7 @@ def _first_of_navego(path: Path, kind: str) -> tuple[dict[str, Array], int, list
         raise lacking(path, kind, NAVEGO_TITLE, _kinds(structures))
     findings = []
     if len(names) > 1:
-        findings.append(
-            Finding("io.first-of-structures", file=path.name, quantity=kind, names=names)
-        )
+        add_warning(findings, "io.first-of-structures", file=path.name, quantity=kind, names=names)
     fields = structures[names[0]]
     count = fields["t"].size
     for field in FIELDS[kind] | ({"vel"} & fields.keys()):
@@ -395,19 +389,17 @@ def _simu(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> Raw
     )
     stamps = np.asarray(t0 + step * np.arange(1.0, len(counts) + 1.0))
     roll, pitch, heading = start.roll_pitch_heading_deg
-    findings.append(
-        Finding(
-            "io.header-states-roll-pitch-heading",
-            file=path.name,
-            quantity="start",
-            severity="note",
-            roll=roll,
-            pitch=pitch,
-            heading=heading,
-            lat_deg=start.lat_deg,
-            lon_deg=start.lon_deg,
-            alt=start.alt,
-        )
+    add_note(
+        findings,
+        "io.header-states-roll-pitch-heading",
+        file=path.name,
+        quantity="start",
+        roll=roll,
+        pitch=pitch,
+        heading=heading,
+        lat_deg=start.lat_deg,
+        lon_deg=start.lon_deg,
+        alt=start.alt,
     )
     return _log_of_psins(path, stamps, np.asarray(counts * factors), rows, AXES, findings, start)
 
@@ -496,14 +488,13 @@ def _matrix(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> R
     if not _GRAVITY[0] <= force <= _GRAVITY[1] or not turned < 2.0 * math.pi:
         return None
     up = float(np.median(block[:, 5])) / usual > 0.5 * force
-    findings.append(
-        Finding(
-            "io.taken-for-psins" if up else "io.taken-for-psins-axes-open",
-            file=path.name,
-            severity="note" if up else "warning",
-            rate_hz=1.0 / usual,
-            force=force,
-        )
+    add_warning(
+        findings,
+        "io.taken-for-psins" if up else "io.taken-for-psins-axes-open",
+        file=path.name,
+        severity="note" if up else "warning",
+        rate_hz=1.0 / usual,
+        force=force,
     )
     return _log_of_psins(path, time, block[:, :6], rows, AXES if up else None, findings, None)
 
@@ -513,9 +504,7 @@ def _block(
 ) -> tuple[Array, NDArray[np.int64]]:
     """Return the numbers of all rows; drop a last row that may have lost digits."""
     if lines and (not ended or len(lines[-1][1].split()) < width):
-        findings.append(
-            Finding("io.last-line-does-not-end", severity="note", file=file, row=lines[-1][0])
-        )
+        add_note(findings, "io.last-line-does-not-end", file=file, row=lines[-1][0])
         lines = lines[:-1]
     if not lines:
         raise DataError("io.header-no-samples-under-2", file=file)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.join import join
@@ -74,15 +74,13 @@ def read_gpx(path: Path) -> RawLog:
         held |= {"speed": (values("speed"), "m/s"), "course": (values("course"), "deg")}
     log = selected(RawLog.of(path, held, clock=UNIX), timed)
     if not timed.all():
-        log.findings.append(
-            Finding(
-                "io.points-without-time",
-                file=path.name,
-                quantity="time",
-                severity="note",
-                lost=int((~timed).sum()),
-                count=timed.size,
-            )
+        add_note(
+            log.findings,
+            "io.points-without-time",
+            file=path.name,
+            quantity="time",
+            lost=int((~timed).sum()),
+            count=timed.size,
         )
     return log
 
@@ -230,14 +228,12 @@ def read_fit_fixes(path: Path) -> RawLog:
     rows = np.array([m["#"] for m in records])
     findings = []
     if lost := len(messages["record"]) - len(records):
-        findings.append(
-            Finding(
-                "io.records-without-place",
-                file=path.name,
-                severity="note",
-                lost=lost,
-                count=len(messages["record"]),
-            )
+        add_note(
+            findings,
+            "io.records-without-place",
+            file=path.name,
+            lost=lost,
+            count=len(messages["record"]),
         )
     return RawLog.of(path, held, clock=clock, rows=rows, findings=findings)
 
@@ -399,14 +395,8 @@ def read_dji(path: Path) -> RawLog:
             lon=lons[~none][0],
         )
     if lost:
-        findings.append(
-            Finding(
-                "io.subtitles-without-place",
-                file=path.name,
-                severity="note",
-                lost=lost,
-                count=len(starts),
-            )
+        add_note(
+            findings, "io.subtitles-without-place", file=path.name, lost=lost, count=len(starts)
         )
     held = {
         "time": (time, "s"),

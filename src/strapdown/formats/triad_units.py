@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.arrays import as_rows, numbers
 from strapdown.formats.columns import parse_axes, read_name
 from strapdown.formats.find_columns import AXES, Column
@@ -325,15 +325,7 @@ def body_axes(
         down = ("-" if sign[2] < 0 else "") + AXES[axis[2]]
         report_upside_down(said, down, raw.name, findings)
     if options.axes and mirrored(axis, sign):
-        findings.append(
-            Finding(
-                "io.axes-mirrored",
-                file=raw.name,
-                quantity="axes",
-                severity="note",
-                text=text,
-            )
-        )
+        add_note(findings, "io.axes-mirrored", file=raw.name, quantity="axes", text=text)
     why = f"{text} {'by --axes' if options.axes else 'of this kind of recording'}"
     return Axes(axis, sign, why)
 
@@ -509,8 +501,8 @@ def report_contradictions(
             questions.ask(fault, **{f"{triad}_unit": likely})
     gravity = said.get("gravity")
     if "accel" in units and gravity is not None and gravity.settled and gravity.value == "removed":
-        findings.append(
-            Finding("io.no-gravity", file=file, quantity="accel", reason=gravity.finding())
+        add_warning(
+            findings, "io.no-gravity", file=file, quantity="accel", reason=gravity.finding()
         )
     axes = said.get("gyro_axes")
     if axes is None or not axes.settled or axes.value == "x,y,z":
@@ -518,14 +510,13 @@ def report_contradictions(
     reversed_sense = axes.value == "-x,-y,-z"
     if reversed_sense and mirrored:
         return
-    findings.append(
-        Finding(
-            "io.gyro-turns-against-gravity" if reversed_sense else "io.gyro-axes-differ",
-            file=file,
-            quantity="gyro",
-            axes=axes.value,
-            reason=axes.finding(),
-        )
+    add_warning(
+        findings,
+        "io.gyro-turns-against-gravity" if reversed_sense else "io.gyro-axes-differ",
+        file=file,
+        quantity="gyro",
+        axes=axes.value,
+        reason=axes.finding(),
     )
 
 
@@ -618,14 +609,13 @@ def report_upside_down(
     up = said.get("up_axis")
     if up is None or up.value != axis or up.confidence < 0.8:
         return
-    findings.append(
-        Finding(
-            "io.axes-upside-down",
-            file=file,
-            quantity="axes",
-            axis=axis,
-            evidence=up.evidence[0],
-        )
+    add_warning(
+        findings,
+        "io.axes-upside-down",
+        file=file,
+        quantity="axes",
+        axis=axis,
+        evidence=up.evidence[0],
     )
 
 
@@ -672,14 +662,12 @@ def sampling_of_sums(
             "io.sampling-against-increments", quantity="--sampling", asked=asked, names=names
         )
     rest = [t for t in ("gyro", "accel") if t in triads - summed]
-    findings.append(
-        Finding(
-            "io.increments-made-means-with-rates" if rest else "io.increments-made-means",
-            file=file,
-            quantity="sampling",
-            severity="note",
-            names=names,
-            rest=rest,
-        )
+    add_note(
+        findings,
+        "io.increments-made-means-with-rates" if rest else "io.increments-made-means",
+        file=file,
+        quantity="sampling",
+        names=names,
+        rest=rest,
     )
     return "mean"

@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_note, check_choice
 from strapdown.formats import (
     asl,
     csv,
@@ -373,7 +373,7 @@ def _write_tum(path: Path, tables: Tables, options: FileOptions) -> list[Finding
         lat, lon, alt = (float(v) for v in first)
         place = {"lat": lat, "lon": lon, "alt": alt}
         source = track.attrs.get("source")
-        findings.append(Finding("io.written-origin", file=source, severity="note", data=place))
+        add_note(findings, "io.written-origin", file=source, data=place)
     return findings
 
 
@@ -391,7 +391,7 @@ def _write_map(path: Path, tables: Tables, options: FileOptions, write: Any) -> 
     if len(track) > options.most_points:
         data = {"most": options.most_points, "rows": len(track)}
         source = track.attrs.get("source")
-        findings.append(Finding("io.written-thinned", file=source, severity="note", data=data))
+        add_note(findings, "io.written-thinned", file=source, data=data)
     if stream == "reference":
         findings.append(not_held("a map", stream, "attitude and velocities", track))
     elif POSITION_SD[0] in _known_columns(track):

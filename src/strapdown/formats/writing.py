@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_note, check_choice
 from strapdown.formats.clocks import (
     GPS,
     GPS_EPOCH,
@@ -299,11 +299,7 @@ def imu_not_held(
     lost = [] if mark else mark_not_held(form, imu)
     if imu.attrs.get("sampling") == "mean":
         source = imu.attrs.get("source")
-        lost.append(
-            Finding(
-                "io.written-means", file=source, quantity="sampling", severity="note", form=form
-            )
-        )
+        add_note(lost, "io.written-means", file=source, quantity="sampling", form=form)
     if MAG[0] in imu.columns and not mag:
         lost.append(not_held(form, "imu", "the magnetic field", imu))
     return lost
