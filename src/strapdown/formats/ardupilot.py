@@ -360,7 +360,7 @@ detect_mavlink = Signs(first=rb"\A.{8,1023}?[\xfd\xfe]", also=_begins)
 def _messages(path: Path, stamp: int) -> tuple[dict[str, Fields], list[Finding]]:
     """Read the fields of the messages of the vehicle, by their names."""
     read = parse("recorders.mavlink", path, wanted=list(IDS.items()))
-    findings = []
+    findings: list[Finding] = []
     if read["others"]:
         add_note(
             findings,

@@ -309,16 +309,37 @@ OFF_TICK = 0.1
 
 @dataclass(frozen=True)
 class EvenStamps:
-    """Stamps at a constant rate that fit those of a clock with coarse ticks.
+    """Stamps at a constant rate in place of those of a coarse clock, or shared by bursts.
 
-    `ticks` ((n,)): in the unit of the stamps. `tick`, `step`: tick of the clock and step of the
-    samples, in the unit of the stamps. `off`: largest distance of a stamp from its tick.
+    `ticks` ((n,)), `step`: in the unit of the stamps, like all others. `tick`, `off`: tick of a
+    coarse clock, and largest distance of a stamp from it. `spread`, `size`: standard deviation of
+    the deliveries of bursts, and mean number of samples of one.
     """
 
     ticks: NDArray[Any]
-    tick: float
     step: float
-    off: float
+    tick: float = 0.0
+    off: float = 0.0
+    spread: float = 0.0
+    size: float = 0.0
+
+    def finding(self, factor: float, **where: Any) -> Finding:
+        """Report them. `factor`: of the unit of the stamps, s."""
+        if self.size:
+            data = {
+                "size": self.size,
+                "rate_hz": 1.0 / (self.step * factor),
+                "spread": self.spread * factor,
+                "interval": self.size * self.step * factor,
+            }
+            return Finding("io.stamps-shared-by-bursts", data=data, **where)
+        data = {
+            "tick": self.tick * factor,
+            "rate": 1.0 / (self.step * factor),
+            "rate_within": self.tick / (self.step**2 * max(self.ticks.size - 1, 1) * factor),
+            "off": self.off * factor,
+        }
+        return Finding("io.stamps-spread-evenly", data=data, **where)
 
 
 def even_stamps(stamps: NDArray[Any]) -> EvenStamps | None:
@@ -362,26 +383,11 @@ def even_stamps(stamps: NDArray[Any]) -> EvenStamps | None:
     first = 0.5 * (float(rest.max()) + float(rest.min()) + tick)
     even = first + step * np.arange(exact.size)
     if exact.dtype.kind == "i" and step > 1000.0:
-        return EvenStamps(exact[0] + np.rint(even).astype(np.int64), tick, step, off)
-    return EvenStamps(exact[0] + even, tick, step, off)
+        return EvenStamps(exact[0] + np.rint(even).astype(np.int64), step, tick, off)
+    return EvenStamps(exact[0] + even, step, tick, off)
 
 
-@dataclass(frozen=True)
-class SpreadBursts:
-    """Stamps of samples that share one by one burst, spread over an even clock.
-
-    `ticks` ((n,)): in the unit of the stamps. `step`, `spread`: step of the samples, and standard
-    deviation of the deliveries, in the unit of the stamps. `size`: mean number of samples of a
-    burst.
-    """
-
-    ticks: NDArray[Any]
-    step: float
-    spread: float
-    size: float
-
-
-def spread_bursts(stamps: NDArray[Any]) -> SpreadBursts | None:
+def spread_bursts(stamps: NDArray[Any]) -> EvenStamps | None:
     """Spread samples that are delivered together, by their clock (`tables.sample_clock`).
 
     None if no stamps repeat, any goes back, or the deliveries scatter by half their interval.
@@ -404,7 +410,7 @@ def spread_bursts(stamps: NDArray[Any]) -> SpreadBursts | None:
         return None
     whole = exact.dtype.kind == "i" and clock.step > 1000.0
     ticks = exact[0] + (np.rint(clock.time).astype(np.int64) if whole else clock.time)
-    return SpreadBursts(ticks, clock.step, clock.spread, size)
+    return EvenStamps(ticks, clock.step, spread=clock.spread, size=size)
 
 
 # Time stamps of a log: units, faults and repairs.
@@ -494,9 +500,11 @@ def read_stamps(
     # Exact, before a factor rounds it.
     ticks = filled(len(stamps), lambda part: (stamps[part] - stamps[0]).astype(np.float64))
     let_go(stamps)
-    if not repair:
-        _refuse_backward(stamps, ticks, file, row)
-    keep, ticks = _repaired(stamps, ticks, file, findings)
+    keep = np.ones(ticks.size, dtype=bool)
+    if len(ticks) > 1 and step_range(ticks)[0] <= 0.0:
+        if not repair:
+            raise _backward(stamps, ticks, file, row)
+        keep, ticks = _repaired(stamps, ticks, file, findings)
     kept = slice(None) if keep.all() else keep
     if unit is None:
         unit, why = _evident_unit(stamps[kept], file, findings, only_seconds)
@@ -532,7 +540,9 @@ def read_stamps(
         since = first * factor - origin.stamp * TIME_UNITS[origin.unit]
     seconds = filled(len(ticks), lambda part: since + ticks[part] * factor)
     let_go(ticks)
-    keep = _without_pauses(seconds, keep, repair, file, row, findings)
+    # In ordinary logs no pause is longer than the log.
+    if np.ptp(seconds) > LONGEST_PAUSE:
+        keep = _without_pauses(seconds, keep, repair, file, row, findings)
     return Stamps(seconds, unit, why, keep, origin, findings)
 
 
@@ -598,9 +608,6 @@ def _without_pauses(
 
     DataError: there is such a pause, and rows may not be dropped.
     """
-    # Ordinary logs end here: no pause is longer than the log.
-    if not np.ptp(seconds) > LONGEST_PAUSE:
-        return keep
     rows = np.flatnonzero(keep)
     time = seconds[rows]
     steps = np.diff(time)
@@ -635,57 +642,30 @@ def _mean_step(ticks: Array) -> float:
     return float((ticks[-1] - ticks[0]) / (ticks.size - 1)) if ticks.size > 1 else 0.0
 
 
-def _refuse_backward(
+def _backward(
     stamps: NDArray[Any], ticks: Array, file: str, row: Callable[[int], int]
-) -> None:
-    if len(ticks) < 2 or step_range(ticks)[0] > 0.0:
-        return
+) -> DataError:
+    """Make the error for stamps that do not advance."""
     steps = np.diff(ticks)
     bad = np.flatnonzero(steps <= 0)
-    if not bad.size:
-        return
     k = int(bad[0])
     here, then = stamps[k], stamps[k + 1]
+    where: dict[str, Any] = {"file": file, "row": row(k + 1), "quantity": "time"}
     if steps[k] == 0 and bad.size > COARSE * steps.size:
         counts = np.diff(np.flatnonzero(steps))
-        raise DataError(
+        return DataError(
             "io.stamps-of-uneven-bursts",
-            file=file,
-            row=row(k + 1),
-            quantity="time",
+            **where,
             then=then,
             count=bad.size,
             least=int(counts.min(initial=steps.size)),
             most=int(counts.max(initial=1)),
         )
     if steps[k] == 0:
-        raise DataError(
-            "io.stamp-repeated",
-            file=file,
-            row=row(k + 1),
-            quantity="time",
-            then=then,
-            count=bad.size,
-        )
+        return DataError("io.stamp-repeated", **where, then=then, count=bad.size)
     if bits := wrap_bits(stamps[k], steps[k], usual_step(steps)):
-        raise DataError(
-            "io.time-counter-wraps",
-            file=file,
-            row=row(k + 1),
-            quantity="time",
-            here=here,
-            then=then,
-            bits=bits,
-        )
-    raise DataError(
-        "io.time-goes-back",
-        file=file,
-        row=row(k + 1),
-        quantity="time",
-        here=here,
-        then=then,
-        count=bad.size,
-    )
+        return DataError("io.time-counter-wraps", **where, here=here, then=then, bits=bits)
+    return DataError("io.time-goes-back", **where, here=here, then=then, count=bad.size)
 
 
 def usual_step(steps: Array) -> float:
@@ -697,8 +677,6 @@ def usual_step(steps: Array) -> float:
 def _repaired(
     stamps: NDArray[Any], ticks: Array, file: str, findings: list[Finding]
 ) -> tuple[NDArray[np.bool_], Array]:
-    if len(ticks) < 2 or step_range(ticks)[0] > 0.0:
-        return np.ones(ticks.size, dtype=bool), ticks
     steps = np.diff(ticks)
     usual = usual_step(steps)
     added = np.zeros(ticks.size)

@@ -636,7 +636,7 @@ def _compared(a: _Column, b: _Column) -> tuple[Array, Array, Array, float]:
 
 def _of_lines(text: _Text, file: str) -> list[Finding]:
     """Findings of labels and values: an incomplete file, a maximum that the table does not have."""
-    findings = []
+    findings: list[Finding] = []
     for line, event in text.above:
         label, _, value = line.rpartition(",")
         lower = label.lower()
@@ -688,7 +688,7 @@ def _of_maximum(
 
 def _of_table(table: _Table, file: str) -> list[Finding]:
     """Findings of delta-V: at the end of the range, or still changing where the table ends."""
-    findings = []
+    findings: list[Finding] = []
     factor = TIME_UNITS.get(table.clock.said.unit, math.nan)
     time = table.clock.values * factor
     for column in table.columns:

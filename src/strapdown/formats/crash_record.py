@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.tables import SAMPLINGS
+from strapdown.tables.checks import IMPOSSIBLE_FORCE, IMPOSSIBLE_RATE
 
 Array = NDArray[np.float64]
 
@@ -178,10 +179,6 @@ class CrashRecord:
 # Values that no sensor reads.
 
 
-# Upper limits of any rate and specific force; squares of larger ones soon overflow a double. A
-# shell is fired with 1e6 m/s².
-IMPOSSIBLE_RATE = 1e6  # rad/s
-IMPOSSIBLE_FORCE = 1e8  # m/s²
 #: Of a channel whose unit is not known: beyond the limits in any of the known units.
 IMPOSSIBLE_NUMBER = 1e12
 

@@ -242,7 +242,7 @@ def means_from_zero(time: ArrayLike, velocity: ArrayLike, channel: CrashChannel)
 def of_start(found: FromZero, channel: CrashChannel, unit: float = 1.0) -> list[Finding]:
     """Findings of a table that begins late, or not at zero; `unit`: factor to m/s."""
     where: dict[str, Any] = {"file": channel.file or None, "quantity": f"channel {channel.name}"}
-    findings = []
+    findings: list[Finding] = []
     if found.late:
         add_warning(findings, "io.delta-v-begins-late", **where, first=found.late)
     if found.offset:

@@ -281,7 +281,7 @@ def _moves(known: MmeCode) -> bool:
 
 
 def _told(file: MmeFile, listed: dict[int, str]) -> list[Finding]:
-    told = []
+    told: list[Finding] = []
     name = clean(file.path.name, LONGEST_NAME)
     number = int(file.path.suffix[1:])
     if file.known is None:

@@ -247,7 +247,7 @@ def _refuse_twins(channels: tuple[Channel, ...], file: Path, lines: list[int]) -
 
 
 def _findings(channels: tuple[Channel, ...], file: Path) -> list[Finding]:
-    findings = []
+    findings: list[Finding] = []
     absent = [c.number for c in channels if not c.present]
     if absent:
         add_note(

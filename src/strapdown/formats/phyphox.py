@@ -208,7 +208,7 @@ def _pauses(member: Member) -> list[Finding]:
         wall = np.asarray(table["system time"], dtype=np.float64)
     except (DataError, KeyError, ValueError, TypeError):
         return [Finding("io.left-out-no-starts-pauses", file=member.label, severity="note")]
-    out = []
+    out: list[Finding] = []
     for k in range(1, len(events)):
         if events[k - 1] == "PAUSE" and events[k] == "START":
             add_warning(

@@ -98,7 +98,7 @@ def _solved(path: Path, stream: str) -> tuple[list[Any], Quantities, list[Findin
         week = np.array([_week(m) for m in fixed])
     if not fixed:
         raise DataError("io.no-usable-fix", file=path.name, quantity="lat, lon")
-    findings = []
+    findings: list[Finding] = []
     if lost := len(messages) - len(fixed):
         code = "io.fixes-without-position-left-out"
         add_note(findings, code, file=path.name, count=lost)
@@ -334,7 +334,7 @@ def read_sbf_fixes(path: Path) -> RawLog:
         sd = np.sqrt(np.diagonal(variance, axis1=1, axis2=2))
         if np.isfinite(sd).any():
             out |= {n: (sd[:, k], unit) for k, n in enumerate(names)}
-    findings = []
+    findings: list[Finding] = []
     if lost := len(rows) - len(use):
         code = "io.fixes-without-position-left-out"
         add_note(findings, code, file=path.name, count=lost)
@@ -421,7 +421,7 @@ detect_sbet = Signs(first=rb"\A.{7}[\x3f-\x41]", also=_has_records)
 
 def read_sbet(path: Path) -> pd.DataFrame:
     """Read position, velocity and attitude."""
-    findings = []
+    findings: list[Finding] = []
     with damage(path):
         values = np.frombuffer(path.read_bytes(), dtype="<f8").reshape(-1, FIELDS)
         bad = ~np.isfinite(values[:, : MOST.size]).all(axis=1)

@@ -256,7 +256,7 @@ def _first_of_navego(path: Path, kind: str) -> tuple[dict[str, Array], int, list
     names = _kinds(structures).get(kind, [])
     if not names:
         raise lacking(path, kind, NAVEGO_TITLE, _kinds(structures))
-    findings = []
+    findings: list[Finding] = []
     if len(names) > 1:
         add_warning(findings, "io.first-of-structures", file=path.name, quantity=kind, names=names)
     fields = structures[names[0]]

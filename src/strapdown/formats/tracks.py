@@ -226,7 +226,7 @@ def read_fit_fixes(path: Path) -> RawLog:
     if np.isfinite(accuracy := values("gps_accuracy")).any():
         held["horizontal_accuracy"] = (accuracy, "m")
     rows = np.array([m["#"] for m in records])
-    findings = []
+    findings: list[Finding] = []
     if lost := len(messages["record"]) - len(records):
         add_note(
             findings,

@@ -15,6 +15,10 @@ from strapdown.errors import DataError
 from strapdown.tables.on_disk import let_go, parts_of, step_range
 
 Array = NDArray[np.float64]
+# Upper limits of any rate and specific force; squares of larger ones soon overflow a double. A
+# shell is fired with 1e6 m/s².
+IMPOSSIBLE_RATE = 1e6  # rad/s
+IMPOSSIBLE_FORCE = 1e8  # m/s²
 
 
 def as_array(values: ArrayLike, columns: int | None, name: str, source: str | None = None) -> Array:
