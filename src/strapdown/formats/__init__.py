@@ -659,7 +659,10 @@ def _calibrated(recording: Recording, asked: ReadOptions) -> Recording:
         warm = temperature_of(recording, recording.files[0], asked.format)
         warmth = None if warm is None else np.interp(imu.index, warm.index, warm)
     imu = known.apply(imu, warmth)
-    imu.attrs["calibrated"] = _mark_of(Path(str(asked.calibration)))
+    file = Path(str(asked.calibration))
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    # Name and SHA-256 identify the calibration in what is written.
+    imu.attrs["calibrated"] = f"{' '.join(file.name.split())}, sha256 {digest}"
     said = [*known.findings(recording.name, Path(str(asked.calibration)).name)]
     if known.not_observed:
         data = {"calibration": Path(str(asked.calibration)).name, "names": known.missing}
@@ -667,12 +670,6 @@ def _calibrated(recording: Recording, asked: ReadOptions) -> Recording:
         add_warning(said, code, file=recording.name, data=data)
     said += _of_another_sensor(imu, known, recording.name, Path(str(asked.calibration)).name)
     return dataclasses.replace(recording, imu=imu, findings=(*recording.findings, *said))
-
-
-def _mark_of(path: Path) -> str:
-    """Name and SHA-256 of a calibration, which identify it in what is written."""
-    name = " ".join(path.name.split())
-    return f"{name}, sha256 {hashlib.sha256(path.read_bytes()).hexdigest()}"
 
 
 #: Rate, rad/s, and force beside gravity, m/s², of a calibrated sensor at rest, which it may have

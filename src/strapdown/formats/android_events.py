@@ -102,16 +102,12 @@ def _by_letters(rows: list[tuple[str, ...]]) -> dict[str, str]:
     return kinds if steady else {}
 
 
-def _has_layout(path: Path) -> bool:
-    """Whether a gyroscope and another sensor are among the kinds of the first rows."""
-    return csv.detect(path) and _layout(head(path, 1 << 16)) is not None
-
-
 detect = Signs(
     # A kind that is a gyroscope.
     text=r"\A[\s\S]{0,16000}?(?:(?i:gyr|rotation|angular)"
     r"|(?m:^|[,;\t |])[ \"']{0,3}(?:4|16|[gGwWrR])[ \"']{0,3}[,;\t |])",
-    also=_has_layout,
+    # A gyroscope and another sensor are among the kinds of the first rows.
+    also=lambda path: csv.detect(path) and _layout(head(path, 1 << 16)) is not None,
 )
 
 

@@ -348,12 +348,11 @@ UNKNOWN = 65535  # of a speed and a course
 Fields = dict[str, NDArray[Any]]
 
 
-def _begins(path: Path) -> bool:
-    """Whether there are two records, each a stamp of these decades and a frame."""
-    return len(list(mavlink_frames(first_bytes(path, 1024), most=2))) == 2
-
-
-detect_mavlink = Signs(first=rb"\A.{8,1023}?[\xfd\xfe]", also=_begins)
+detect_mavlink = Signs(
+    first=rb"\A.{8,1023}?[\xfd\xfe]",
+    # Two records, each a stamp of these decades and a frame.
+    also=lambda path: len(list(mavlink_frames(first_bytes(path, 1024), most=2))) == 2,
+)
 
 
 @lru_cache(maxsize=1)

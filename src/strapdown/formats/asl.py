@@ -66,19 +66,11 @@ LONGEST_STEP = 0.1  # s
 MOST_TILT = 15.0  # deg
 
 
-def _has_names(path: Path) -> bool:
-    return _is_imu(path) or _is_truth(path)
-
-
-def _has_tables(folder: Path) -> bool:
-    return _imu_of(folder) is not None or _truth_of(folder) is not None
-
-
 detect = Signs(
     suffixes=(".csv",),
     text=r"(?i)\A\s*+(?=.*timestamp)(?=.*(?:w_rs_s_x|q_rs_w))",
-    also=_has_names,
-    folder=_has_tables,
+    also=lambda path: _is_imu(path) or _is_truth(path),
+    folder=lambda path: _imu_of(path) is not None or _truth_of(path) is not None,
 )
 
 

@@ -39,12 +39,10 @@ AXES = "x,y,z"
 LONGEST_STEP = 0.5  # s
 
 
-def _has_arrays(folder: Path) -> bool:
-    """Whether a folder has the arrays of the gyro or of a receiver."""
-    return _find(folder, "IMU", "gyro", "t") is not None or bool(files_of(folder))
-
-
-detect = Signs(folder=_has_arrays)
+# The arrays of the gyro or of a receiver.
+detect = Signs(
+    folder=lambda path: _find(path, "IMU", "gyro", "t") is not None or bool(files_of(path))
+)
 
 
 def read(path: Path) -> RawLog:

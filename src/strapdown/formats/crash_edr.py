@@ -605,7 +605,7 @@ def _one_unit(table: _Table, file: str, findings: list[Finding]) -> _Table:
                     quantity="unit",
                     value=float(x[k]),
                     value_2=float(y[k]),
-                    unit=_si(a),
+                    unit={"acceleration": "m/s²", "rate": "rad/s"}.get(a.said.quantity, "m/s"),
                     **data,
                 )
                 continue
@@ -616,10 +616,6 @@ def _one_unit(table: _Table, file: str, findings: list[Finding]) -> _Table:
             data["other"] = coarse.heading
             add_note(findings, "io.edr-two-units", file=file, quantity="unit", **data)
     return replace(table, columns=tuple(c for c in table.columns if id(c) not in gone))
-
-
-def _si(column: _Column) -> str:
-    return {"acceleration": "m/s²", "rate": "rad/s"}.get(column.said.quantity, "m/s")
 
 
 def _factor(column: _Column) -> float:

@@ -342,7 +342,9 @@ def triad_stamps(
     values = channel.samples() if channel.samples is not None else channel.load()[1]
     values = np.asarray(values, dtype=np.float64)
     if rate_hz is None:
-        return _same_length(channel, *_stated(record, name, time_unit, findings), values)
+        seconds, told = seconds_of(_clock_of(record, name, time_unit))
+        findings += told
+        return _same_length(channel, seconds, name, values)
     if time is None and name and channel.samples is not None:
         steps = np.diff(_clock_of(record, name, time_unit).stamps.astype(np.float64))
         # Stamps that decrease, or change only once, are not a clock: samples are counted from zero.
@@ -373,14 +375,6 @@ def _clock_of(record: CrashRecord, name: str, time_unit: str | None) -> Clock:
     unit = recorded or stated
     stamps = past_midnight(np.asarray(read()), unit)
     return Clock(name, stamps, unit, held.file or record.path.name, held.row)
-
-
-def _stated(
-    record: CrashRecord, name: str, time_unit: str | None, findings: list[Finding]
-) -> tuple[Array, str]:
-    seconds, told = seconds_of(_clock_of(record, name, time_unit))
-    findings += told
-    return seconds, name
 
 
 def _same_length(

@@ -401,15 +401,14 @@ def write_nhtsa(
     lines = [
         line
         for section, held in sections.items()
-        for line in (f"----- {section} -----", *("|".join(map(_field, row)) for row in held))
+        for line in (
+            f"----- {section} -----",
+            *("|".join(clean(t).replace("|", "/") for t in row) for row in held),
+        )
     ]
     head = "".join(f"{line}\n" for line in lines)
     (Path(folder) / f"{stem}.EV5").write_bytes(head.encode("latin-1", "replace"))
     return {name: str(number) for name, number in numbers.items()}
-
-
-def _field(text: str) -> str:
-    return clean(text).replace("|", "/")
 
 
 def _curves(channels: list[CrashChannel]) -> dict[str, int]:

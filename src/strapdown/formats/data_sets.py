@@ -27,12 +27,10 @@ Array = NDArray[np.float64]
 # Trials of BROAD (Laidig, Caruso, Cereatti, Seel, Data 2021 6(7):72), with optical truth.
 
 
-def _has_trial(path: Path) -> bool:
-    """Whether HDF5 has the datasets of BROAD."""
-    return hdf5.outline(path)[0] >= {"imu_gyr", "imu_acc", "opt_quat"}
-
-
-detect_broad = Signs(suffixes=hdf5.SUFFIXES, also=_has_trial)
+detect_broad = Signs(
+    suffixes=hdf5.SUFFIXES,
+    also=lambda path: hdf5.outline(path)[0] >= {"imu_gyr", "imu_acc", "opt_quat"},
+)
 
 
 def read_broad(path: Path) -> RawLog:
@@ -89,12 +87,9 @@ TRIADS = {GYRO: ("gyro", "rad/s"), FORCE: ("accel", "m/s2"), MAG: ("mag", "uT")}
 CHEST = "pose/tango_ori"
 
 
-def _has_datasets(path: Path) -> bool:
-    """Whether HDF5 has the stamps and both sensors."""
-    return hdf5.outline(path)[0] >= {TIME, GYRO, FORCE}
-
-
-detect_ronin = Signs(suffixes=hdf5.SUFFIXES, also=_has_datasets)
+detect_ronin = Signs(
+    suffixes=hdf5.SUFFIXES, also=lambda path: hdf5.outline(path)[0] >= {TIME, GYRO, FORCE}
+)
 
 
 def read_ronin(path: Path) -> RawLog:
@@ -151,11 +146,7 @@ ACCEL_FILE = "mpu6050_accelerometer.mat"
 MPU_AXES = "-x,y,-z"
 
 
-def _has_gyro(folder: Path) -> bool:
-    return (folder / GYRO_FILE).is_file()
-
-
-detect_mpu = Signs(folder=_has_gyro)
+detect_mpu = Signs(folder=lambda path: (path / GYRO_FILE).is_file())
 
 
 def read_mpu(path: Path) -> RawLog:
@@ -279,11 +270,7 @@ LOG, POINTS = ("timestamps", "imu_data"), ("strideIndex", "GCP")
 COLUMNS = [*(f"accel_{a}" for a in "xyz"), *(f"gyro_{a}" for a in "xyz")]
 
 
-def _has_log(path: Path) -> bool:
-    return set(LOG) <= _names(path)
-
-
-detect_foot = Signs(suffixes=(".mat",), also=_has_log)
+detect_foot = Signs(suffixes=(".mat",), also=lambda path: set(LOG) <= _names(path))
 
 
 def detect_foot_points(path: Path) -> bool:

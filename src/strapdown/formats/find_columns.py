@@ -347,7 +347,9 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
         if quantity in wanted:
             continue
         if len(names) > 1 and quantity == "time":
-            names = [n for n in names if n != "T" and not _stands(raw.columns[n])]
+            # Nor is a stamp that every row has, as a date beside a clock that starts at zero.
+            held = {n: raw.columns[n] for n in names if n != "T"}
+            names = [n for n, v in held.items() if not (v.size > FEW and (v == v[0]).all())]
             names = _one_clock(raw, names) if names else []
         if not names:
             continue
@@ -506,11 +508,6 @@ def _one_clock(raw: RawLog, names: list[str]) -> list[str]:
     return names
 
 
-def _stands(values: NDArray[Any]) -> bool:
-    """Whether every row has the same stamp, as a date beside a clock that starts at zero."""
-    return values.size > FEW and bool((values == values[0]).all())
-
-
 #: Rows that a clock may stand still for: a burst of samples.
 FEW = 50
 
@@ -538,16 +535,12 @@ def _ros_unit(raw: RawLog, column: str) -> str | None:
     return ROS[field[2]][1]
 
 
-def _members(quantity: str) -> list[str]:
-    return [f"{quantity}_{a}" for a in AXES] if quantity in TRIADS else [quantity]
-
-
 def _asked(raw: RawLog, quantity: str, source: str) -> list[tuple[str, str]]:
     """Resolve one ``quantity=source`` of the user to existing columns."""
     names = list(raw.columns)
     if quantity in TRIADS:
         if members := _three_of(raw, quantity, source):
-            return list(zip(_members(quantity), members, strict=True))
+            return [(f"{quantity}_{a}", m) for a, m in zip(AXES, members, strict=True)]
     elif source in raw.columns:
         return [(quantity, source)]
     elif source.isdecimal() and 1 <= int(source) <= len(names):

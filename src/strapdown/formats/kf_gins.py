@@ -340,12 +340,8 @@ def _member(folder: Path, is_one: Callable[[Path], bool]) -> Path | None:
     return found[0] if len(found) == 1 else None
 
 
-def _has_increments(folder: Path) -> bool:
-    """Whether there is one text of increments; there may be fixes and a trajectory."""
-    return _member(folder, detect) is not None
-
-
-detect_folder = Signs(folder=_has_increments)
+# One text of increments; there may be fixes and a trajectory.
+detect_folder = Signs(folder=lambda path: _member(path, detect) is not None)
 
 
 def _of_folder(path: Path, stream: str, is_one: Callable[[Path], bool]) -> Path:

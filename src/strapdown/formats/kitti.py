@@ -339,7 +339,11 @@ def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
         accel_needed(imu, "KITTI")
         own, said = dates(imu, options, "KITTI")
         inside = _within(own, stamps)
-        findings += [*said, *imu_not_held("KITTI", imu), *_left_out(imu, inside)]
+        findings += [*said, *imu_not_held("KITTI", imu)]
+        if not inside.all():
+            lost = {"count": int((~inside).sum()), "rows": inside.size}
+            source = imu.attrs.get("source")
+            findings.append(Finding("io.written-samples-left-out", file=source, data=lost))
         if not inside.any():
             raise DataError("io.written-no-overlap", file=imu.attrs.get("source"), form="KITTI")
         from strapdown.evaluation.trajectory_differences import trajectory_at
@@ -374,13 +378,6 @@ def _within(own: NDArray[np.int64], stamps: NDArray[np.int64]) -> NDArray[np.boo
     after = np.clip(after, 1, stamps.size - 1)
     inside &= stamps[after] - stamps[after - 1] <= LONGEST_STEP * SECOND
     return np.asarray(inside | np.isin(own, stamps))
-
-
-def _left_out(imu: pd.DataFrame, inside: NDArray[np.bool_]) -> list[Finding]:
-    if inside.all():
-        return []
-    data = {"count": int((~inside).sum()), "rows": inside.size}
-    return [Finding("io.written-samples-left-out", file=imu.attrs.get("source"), data=data)]
 
 
 def _interpolated(imu: pd.DataFrame, same: NDArray[np.bool_]) -> list[Finding]:

@@ -177,7 +177,9 @@ def read(path: Path) -> RawLog:
         blocks["mag"] = (np.array([one.mag or none for one in joined]), "uT")
     for triad, (values, unit) in blocks.items():
         columns |= {f"{triad}_{axis}": (values[:, k], unit) for k, axis in enumerate("xyz")}
-    log = RawLog.of(path, columns, axes=run.get("axes"), sampling=_sampling(run))
+    live = (run.get("configuration") or {}).get("live") or {}
+    sampling = str(live.get("sampling") or "instantaneous")
+    log = RawLog.of(path, columns, axes=run.get("axes"), sampling=sampling)
     log.name, log.files = name, files_of(path)
     log.clock, log.epoch = (UNIX, float(streams.epoch)) if streams.epoch else (RELATIVE, 0.0)
     log.sparse = frozenset({"mag"})
@@ -254,12 +256,6 @@ def fixes_of(located: Sequence[Located], name: str, clock: Clock) -> Fixes:
         position_sd=np.column_stack([horizontal, horizontal, vertical]),
         velocity_sd=np.column_stack([sd, sd, nothing]),
     )
-
-
-def _sampling(run: dict[str, Any]) -> str:
-    """Return the sampling that a run of navigation was configured with."""
-    live = (run.get("configuration") or {}).get("live") or {}
-    return str(live.get("sampling") or "instantaneous")
 
 
 def _received(path: Path) -> tuple[dict[str, Any], list[Joined | Located], SensorStreams]:

@@ -276,10 +276,6 @@ def _point(file: MmeFile) -> str:
     return noted or (file.known.point if file.known else "")
 
 
-def _moves(known: MmeCode) -> bool:
-    return known.quantity in ("acceleration", "rate")
-
-
 def _told(file: MmeFile, listed: dict[int, str]) -> list[Finding]:
     told: list[Finding] = []
     name = clean(file.path.name, LONGEST_NAME)
@@ -293,7 +289,11 @@ def _told(file: MmeFile, listed: dict[int, str]) -> list[Finding]:
             quantity="channel code",
             word=file.code,
         )
-    elif not file.known.listed and file.known.body == "vehicle" and _moves(file.known):
+    elif (
+        not file.known.listed
+        and file.known.body == "vehicle"
+        and (file.known.quantity in ("acceleration", "rate"))
+    ):
         add_note(
             told,
             "io.location-code-unknown",

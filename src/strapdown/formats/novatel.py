@@ -77,11 +77,6 @@ WEEK_MS = 604_800_000
 Frames = dict[int, list[tuple[int, bytes]]]
 
 
-def _has_messages(path: Path) -> bool:
-    """Whether two frames with their CRC are among the first bytes."""
-    return sum(map(len, _frames(first_bytes(path, 8192))[0].values())) >= 2
-
-
 #: Messages as text: number, layout of the binary message, and which of the fields of a line are
 #: its values. Fields that are words or hexadecimal are in `_WORDS` and `_HEX`.
 TEXTS: dict[str, tuple[int, str]] = {
@@ -119,7 +114,8 @@ _LINE = re.compile(
 
 detect = Signs(
     first=rb"\xaa\x44[\x12\x13]|(?m:^[#%](?:BESTPOS|BESTVEL|INSPVA|RAWIMU)S?X?A,)",
-    also=_has_messages,
+    # Two frames with their CRC.
+    also=lambda path: sum(map(len, _frames(first_bytes(path, 8192))[0].values())) >= 2,
 )
 
 

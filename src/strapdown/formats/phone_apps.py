@@ -50,12 +50,10 @@ WORDS = {
 }
 
 
-def _has_vectors(path: Path) -> bool:
-    """Whether the first line names the three vectors."""
-    return csv.detect(path) and len(_named(names_of(path))) == 9
-
-
-detect_core_motion = Signs(text=r"(?i)\A.*grav", also=_has_vectors)
+# The first line names the three vectors.
+detect_core_motion = Signs(
+    text=r"(?i)\A.*grav", also=lambda path: csv.detect(path) and len(_named(names_of(path))) == 9
+)
 
 
 def _named(names: list[str]) -> dict[str, str]:
@@ -216,20 +214,19 @@ MATLAB_MOBILE_FIXES: dict[str, tuple[str, str | None]] = {
 _DATE = "%d-%b-%Y %H:%M:%S.%f"
 
 
-def _has_tables(folder: Path) -> bool:
-    """Whether a folder has tables whose stamps have the months of MATLAB's dates."""
-    return any(_table_of_matlab_mobile(folder, name) for name in ("AngularVelocity", "Position"))
+# Tables whose stamps have the months of MATLAB's dates.
+detect_matlab_mobile = Signs(
+    folder=lambda path: any(
+        _table_of_matlab_mobile(path, name) for name in ("AngularVelocity", "Position")
+    )
+)
 
 
-detect_matlab_mobile = Signs(folder=_has_tables)
-
-
-def _has_objects(path: Path) -> bool:
-    """Whether there are objects of MATLAB, which nothing else opens."""
-    return any(kind == "opaque" for _, kind in contents_of_matlab(path))
-
-
-detect_matlab_mobile_objects = Signs(suffixes=(".mat",), also=_has_objects)
+# Objects of MATLAB, which nothing else opens.
+detect_matlab_mobile_objects = Signs(
+    suffixes=(".mat",),
+    also=lambda path: any(kind == "opaque" for _, kind in contents_of_matlab(path)),
+)
 
 
 def refuse_matlab_mobile(path: Path) -> RawLog:

@@ -66,21 +66,11 @@ MODERN = 10**18  # ns, 2001: a clock since the start of a device never counts so
 Columns = dict[str, NDArray[Any]]
 
 
-def _has_messages(path: Path) -> bool:
-    """Whether a bag has the tables of ROS 2; only a ``.db3`` can lack them."""
-    if _suffix(path) != ".db3":
-        return True
-    return bool(parse("bags.has_messages", path))
-
-
-def _is_described(folder: Path) -> bool:
-    return b"rosbag2_bagfile_information" in first_bytes(folder / "metadata.yaml", 4096)
-
-
 detect = Signs(
     first=rb"\A(?:" + b"|".join(map(re.escape, MAGIC)) + rb")",
-    also=_has_messages,
-    folder=_is_described,
+    # Of a bag of ROS 2 only a ``.db3`` can lack its tables.
+    also=lambda path: _suffix(path) != ".db3" or bool(parse("bags.has_messages", path)),
+    folder=lambda path: b"rosbag2_bagfile_information" in first_bytes(path / "metadata.yaml", 4096),
 )
 
 

@@ -73,7 +73,10 @@ def read(path: Path) -> RawLog:
                 add_note(findings, "io.last-line-cut-left-out-2", file=path.name, row=row)
                 break
             raise DataError(
-                "io.not-stamp-blocks-id-values", file=path.name, row=row, value_shown=_shown(line)
+                "io.not-stamp-blocks-id-values",
+                file=path.name,
+                row=row,
+                value_shown=line if len(line) <= 60 else f"{line[:60]}…",
             )
         for kind, values in parsed[1].items():
             seen.setdefault(kind, []).append((row, parsed[0], values))
@@ -140,7 +143,3 @@ def blocks_of(line: str) -> tuple[float, Blocks] | None:
     except (ValueError, IndexError):
         return None
     return stamp, blocks
-
-
-def _shown(line: str) -> str:
-    return line if len(line) <= 60 else f"{line[:60]}…"

@@ -11,10 +11,11 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from functools import lru_cache
+from functools import lru_cache, wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+T = TypeVar("T")
 #: Bytes of a file that are looked at.
 HEAD = 1 << 16
 
@@ -103,6 +104,16 @@ def state_of(path: Path) -> tuple[Any, ...]:
         return tuple((str(p), (at := p.stat()).st_size, at.st_mtime_ns) for p in inside)
     except OSError:
         return ()
+
+
+def while_unchanged(most: int) -> Callable[[Callable[[Path], T]], Callable[[Path], T]]:
+    """Keep the newest results of a function of a path until its file or folder changes."""
+
+    def decorated(read: Callable[[Path], T]) -> Callable[[Path], T]:
+        kept = lru_cache(maxsize=most)(lambda path, _state: read(path))
+        return wraps(read)(lambda path: kept(path, state_of(path)))
+
+    return decorated
 
 
 def head(path: Path, count: int = 1 << 14) -> str:

@@ -328,12 +328,11 @@ def load_numpy(path: Path, label: str) -> NDArray[Any]:
 # Folders of NumPy arrays, one per quantity: ``time.npy``, ``gyro_rad_s.npy``, ``accel.npy``.
 
 
-def _has_gyro(folder: Path) -> bool:
-    """Whether a folder has an array with the name of a gyro."""
-    return any(str(read_name(p.stem).quantity).startswith("gyro") for p in _arrays(folder))
-
-
-detect_numpy_folder = Signs(folder=_has_gyro)
+detect_numpy_folder = Signs(
+    folder=lambda path: any(
+        str(read_name(p.stem).quantity).startswith("gyro") for p in _arrays(path)
+    )
+)
 
 
 def read_numpy_folder(path: Path) -> RawLog:

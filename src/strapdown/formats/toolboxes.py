@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from strapdown.formats.columns import read_name
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.known_formats import column, lacking, under
 from strapdown.formats.recording import NoStreamError, RawLog, StatedStart
-from strapdown.formats.signs import Signs, head, state_of
+from strapdown.formats.signs import Signs, head, while_unchanged
 from strapdown.parsers import parse
 from strapdown.rotation import dcm_from_euler
 from strapdown.tables import trajectory_table
@@ -561,23 +560,20 @@ COLUMNS = [*(f"gyro_{a}" for a in "xyz"), *(f"accel_{a}" for a in "xyz")]
 def _holds(path: Path, *names: str) -> bool:
     if not path.is_file() or path.suffix.lower() != ".npz":
         return False
-    return set(names) <= _names(path, state_of(path))
+    return set(names) <= _names(path)
 
 
-@lru_cache(maxsize=4)
-def _names(path: Path, _state: tuple[Any, ...]) -> frozenset[str]:
+@while_unchanged(4)
+def _names(path: Path) -> frozenset[str]:
     return frozenset(parse("archives.array_names", path))
 
 
 STREAMS = {"imu": ("time", "imu"), "gnss": ("fix_time", "fix"), "reference": ("time", "truth")}
 
 
-def _has_stream(path: Path) -> bool:
-    """Whether the archive has the arrays of a stream."""
-    return any(_holds(path, *names) for names in STREAMS.values())
-
-
-detect_python_ins = Signs(suffixes=(".npz",), also=_has_stream)
+detect_python_ins = Signs(
+    suffixes=(".npz",), also=lambda path: any(_holds(path, *names) for names in STREAMS.values())
+)
 
 
 def _arrays(path: Path, stream: str, width: int) -> tuple[Array, Array]:
