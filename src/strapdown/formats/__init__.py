@@ -61,8 +61,7 @@ from strapdown.formats import (
 from strapdown.formats.assemble import assemble
 from strapdown.formats.find_columns import names_of_fixes, names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
-from strapdown.formats.instances import of_one_sensor
-from strapdown.formats.known_formats import or_sentences
+from strapdown.formats.known_formats import of_one_sensor, or_sentences
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
 from strapdown.formats.signs import HEAD, Signs, first_bytes, state_of
 from strapdown.formats.vocabularies import BODY_RATES

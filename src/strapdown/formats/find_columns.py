@@ -14,7 +14,6 @@ from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, ch
 from strapdown.formats.arrays import is_stamp, numbers, ticks_of
 from strapdown.formats.clocks import clock_of_name
 from strapdown.formats.columns import INDEXED, ColumnName, clocks_with_unit, read_name
-from strapdown.formats.nameless import rates_and_force
 from strapdown.formats.recording import INFERRED, STATED, Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import (
     BODY_RATES,
@@ -27,6 +26,7 @@ from strapdown.formats.vocabularies import (
 )
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, OF_TABLES, unit_of
 
+Array = NDArray[np.float64]
 AXES = "xyz"
 
 
@@ -285,6 +285,75 @@ def _by_motion(raw: RawLog) -> dict[str, str]:
     for triad, at in zip(("gyro", "accel"), found, strict=True):
         out |= {f"{triad}_{axis}": str(at + k + 1) for k, axis in enumerate(AXES)}
     return out
+
+
+# Gyro and accelerometer among columns without names, by the motion of a body: the specific force of
+# one that turns, and is not shaken, turns against it: df/dt = -w x f. Of all triads of neighboring
+# columns, the gyro and the accelerometer of one unit fulfil it.
+
+
+#: Most columns and samples that are compared; samples of one change of the force: of seconds, in
+#: which a hand turns it more than it shakes it, at 10 to 200 Hz.
+COMPARED, MOST_SAMPLES, SPANS = 64, 6000, (25, 100, 200)
+#: Fewest changes that are compared.
+FEWEST_CHANGES = 8
+#: Least share of the changes that a gyro explains, and how far below the best the first may be.
+LEAST, NEAR = 0.8, 0.1
+#: Least turn of a force in all, rad.
+TURNED = 0.05
+
+
+def rates_and_force(columns: list[NDArray[np.generic]]) -> tuple[int, int] | None:
+    """Return the numbers, from 0, of the first columns of the gyro and of the accelerometer.
+
+    `columns` ((n,) each): a column that is no number is None of a triad. None where no pair of
+    triads explains the motion.
+    """
+    held = [_varied(c) for c in columns[:COMPARED]]
+    triads: dict[int, Array] = {}
+    for k in range(len(held) - 2):
+        columns_of = [c for c in held[k : k + 3] if c is not None]
+        if len(columns_of) == 3:
+            triads[k] = np.column_stack(columns_of)
+    forces = {}
+    for k, three in triads.items():
+        low, usual, high = np.quantile(np.linalg.norm(three, axis=1), (0.1, 0.5, 0.9))
+        if usual > 0.0 and (high - low) < LOOSEST * usual:
+            forces[k] = three
+    shares: dict[tuple[int, int], float] = {}
+    for at, force in forces.items():
+        for k, rate in triads.items():
+            if abs(k - at) >= 3:
+                turned = -np.cross(rate, force)
+                shares[k, at] = max(_explained(turned, force, span) for span in SPANS)
+    best = max(shares.values(), default=0.0)
+    if best < LEAST:
+        return None
+    return min(pair for pair, share in shares.items() if share > best - NEAR)
+
+
+def _explained(turned: Array, force: Array, span: int) -> float:
+    """Return the share of a force's changes that its turning explains, by one positive factor.
+
+    `turned` ((n, 3)): -w x f; the step of time, and the unit of the rates, are in the factor.
+    """
+    change = force[span::span] - force[:-span:span]
+    if len(change) < FEWEST_CHANGES:
+        return 0.0
+    turn = float(np.linalg.norm(change, axis=1).sum()) / float(np.abs(force).max())
+    if turn < TURNED:
+        return 0.0
+    model = turned[: len(change) * span].reshape(len(change), span, 3).sum(axis=1)
+    size, both = float((model * model).sum()), float((model * change).sum())
+    return both * both / (size * float((change * change).sum())) if size > 0.0 < both else 0.0
+
+
+def _varied(column: NDArray[np.generic]) -> Array | None:
+    """Return the first values of a column that is a number and not constant; None otherwise."""
+    if column.dtype.kind not in "iuf" or column.size < FEWEST_CHANGES * SPANS[0]:
+        return None
+    values = np.asarray(column[:MOST_SAMPLES], dtype=np.float64)
+    return values if bool(np.isfinite(values).all()) and np.ptp(values) > 0.0 else None
 
 
 def advances(values: NDArray[Any]) -> bool:
@@ -601,9 +670,6 @@ def _is_axis(name: str, prefix: str, axis: str) -> bool:
 
 
 # Quantities of other tables, as fixes and trajectories, by a vocabulary of their own.
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -436,12 +436,12 @@ def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]
         form = said.get(f"{triad}_form")
         if triad in asked or other is None:
             continue
-        fault = Finding(
-            "io.contradicts-unit", file=log.raw.name, quantity=triad, triad=triad, unit=unit
-        )
+        code, why = "io.contradicts-unit", other
+        data: dict[str, Any] = {"file": log.raw.name, "quantity": triad, "triad": triad}
+        data["unit"] = unit
         if triad == "gyro" and not other.settled and (instead := _instead(unit, other)):
-            reason = other.finding()
-            log.questions.ask(fault.replace(likely=instead, reason=reason), gyro_unit=instead)
+            fault = Finding(code, **data, likely=instead, reason=other.finding())
+            log.questions.ask(fault, gyro_unit=instead)
         if not other.settled:
             continue
         # Sizes of rates alone do not contradict a statement: gravity that rotated with them
@@ -450,7 +450,7 @@ def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]
         stepped = any(e.code == "io.evidence-steps-of-sensor" for e in other.evidence)
         if triad == "gyro" and not (turned or stepped):
             continue
-        likely, code, why = str(other.value), fault.code, other
+        likely = str(other.value)
         kind = form.value if form is not None and form.settled else None
         if unit in SUMS[triad]:
             if kind != "rate" or form is None:
@@ -463,7 +463,7 @@ def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]
             code = "io.mag-contradicts-unit" if triad == "mag" else code
         else:
             continue
-        fault = fault.replace(code=code, likely=likely, reason=why.finding())
+        fault = Finding(code, **data, likely=likely, reason=why.finding())
         if triad == "mag":
             log.findings.append(fault)
         else:
