@@ -41,7 +41,7 @@ from strapdown.formats.find_columns import LOOSEST, norm_and_spread
 from strapdown.formats.inference.conclusion import infer_accel
 from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.join import join
-from strapdown.formats.known_formats import force_of, sensor_log, split
+from strapdown.formats.known_formats import force_of, sensor_log
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 from strapdown.formats.triad_units import LIKELY
@@ -117,7 +117,7 @@ def _layout(text: str) -> tuple[int, int, int, str | None, dict[str, str]] | Non
     if len(lines) < 3:
         return None
     separator = csv.separator_of(lines[1])
-    rows = [split(line, separator) for line in lines]
+    rows = [csv.fields_of(line, separator) for line in lines]
     header = rows[0] if len(rows[0]) >= 5 and not csv.are_data(rows[0][2:]) else []
     # An axis of a sensor is in the header of a table of samples.
     axes = ("gyro_", "accel_", "mag_", "rate_")
@@ -210,7 +210,7 @@ def read(path: Path) -> RawLog:
         if not line.strip() or csv.is_comment(line):
             continue
         separator = separator or csv.separator_of(line)
-        fields = split(line, separator)
+        fields = csv.fields_of(line, separator)
         which = None
         if len(fields) > kind:
             which = letters.get(fields[kind]) or kind_of(fields[kind])

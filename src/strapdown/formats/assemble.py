@@ -83,7 +83,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     questions = Questions(raw.name)
     found = find_columns(raw, options, questions)
     require_gyro(raw, found)
-    _refuse_unit_of_nothing(raw, found, options)
+    if options.accel_unit is not None and not set(ACCEL) & set(found):
+        _refuse_unit_of_nothing(raw, found, options.accel_unit)
     unused = _unused(raw, found)
     if parts := _by_sensor(raw, found):
         raw = dataclasses.replace(
@@ -136,8 +137,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
             unit = str(best["unit"]) if best["share"] >= LIKELY else "UNIT"
             questions.ask(error.finding, time_unit=unit)
         elif code == "io.time-column-missing":
-            clock = _likely_clock(raw, found)
-            questions.ask(error.finding, **({"time": clock} if clock else {"rate": "HZ"}))
+            name = _likely_clock(raw, found)
+            questions.ask(error.finding, **({"time": name} if name else {"rate": "HZ"}))
         else:
             questions.refuse()
             raise
@@ -167,7 +168,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     if even is not None:
         factor = TIME_UNITS[stamps.unit]
         findings.append(even.finding(factor, file=raw.name, quantity="time"))
-    readings = [_time_reading(log, stamps, int(kept[0]))]
+    clock, of_time = _clock_of_log(log, stamps, dated, int(kept[0]))
+    readings = [of_time]
     body, block = _block(values, units, kept.size, keep)
     begins = {triad: values[triad][kept[0]].copy() for triad in units}
     factors = {t: factor_of(unit, {**UNITS[t], **SUMS[t]}) for t, (unit, _) in units.items()}
@@ -218,7 +220,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         ("-" if sign < 0 else "") + AXES[axis]
         for axis, sign in zip(axes.axis, axes.sign, strict=True)
     )
-    with_clock(imu, _clock_of_log(log, stamps, dated))
+    with_clock(imu, clock)
     if raw.epoch == 0.0:
         imu.attrs["clock_origin_stamp"] = (stamps.origin.stamp, stamps.origin.unit)
     if raw.calibrated is not None:
@@ -355,13 +357,12 @@ def _as_accelerometer(raw: RawLog, three: list[str]) -> dict[str, Any]:
     return {"columns": ",".join(columns), "unit": str(unit or "UNIT")}
 
 
-def _refuse_unit_of_nothing(raw: RawLog, found: dict[str, Column], options: ReadOptions) -> None:
+def _refuse_unit_of_nothing(raw: RawLog, found: dict[str, Column], unit: str) -> None:
     """Refuse a unit that the user states for an accelerometer of which there is no column.
 
     A reader that left the accelerometer out has said so.
     """
-    left_out = any(f.quantity == "accel" for f in raw.findings)
-    if options.accel_unit is None or set(ACCEL) & set(found) or left_out:
+    if any(f.quantity == "accel" for f in raw.findings):
         return
     used = {column.source for column in found.values()}
     names = [name for name in raw.columns if name and name not in used]
@@ -370,7 +371,7 @@ def _refuse_unit_of_nothing(raw: RawLog, found: dict[str, Column], options: Read
         "io.unit-without-column",
         file=raw.name,
         quantity="--accel-unit",
-        unit=options.accel_unit,
+        unit=unit,
         names=names or ["none"],
         columns=_as_accelerometer(raw, likely[0])["columns"]
         if likely
@@ -531,25 +532,18 @@ def _stamps_of_log(
     return stamps
 
 
-def _time_reading(log: LogInUse, stamps: Stamps, sample: int) -> Reading:
-    """Describe how the time column was read, with its value at the first sample used."""
+def _clock_of_log(log: LogInUse, stamps: Stamps, dated: bool, sample: int) -> tuple[Clock, Reading]:
+    """Return the clock of a log, and how its stamps were read, with the one of the first sample."""
     if "time" not in log.found:
-        return Reading("(none)", "time", "s", stamps.why, 0.0)
-    column = log.found["time"]
-    values = log.raw.columns[column.source]
+        return Clock(RELATIVE), Reading("(none)", "time", "s", stamps.why, 0.0)
+    raw, column = log.raw, log.found["time"]
+    origin = raw.epoch + float(stamps.origin.stamp) * TIME_UNITS[stamps.origin.unit]
+    since = origin + float(stamps.seconds[0])
+    name = raw.clock or clock_of_name(column.source, since, dated=dated)
+    values = raw.columns[column.source]
     first = float(values[sample]) if values.dtype.kind in "iufb" else str(values[sample])
     why = f"{column.why}; unit {stamps.why}"
-    return Reading(column.source, "time", stamps.unit, why, first)
-
-
-def _clock_of_log(log: LogInUse, stamps: Stamps, dated: bool) -> Clock:
-    """Return the clock of a log's stamps."""
-    if "time" not in log.found:
-        return Clock(RELATIVE)
-    origin = log.raw.epoch + float(stamps.origin.stamp) * TIME_UNITS[stamps.origin.unit]
-    first = origin + float(stamps.seconds[0])
-    name = log.raw.clock or clock_of_name(log.found["time"].source, first, dated=dated)
-    return Clock(name, origin)
+    return Clock(name, origin), Reading(column.source, "time", stamps.unit, why, first)
 
 
 # No body that is carried, driven or flown turns this fast for a twentieth of a log.

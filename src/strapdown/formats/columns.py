@@ -517,8 +517,13 @@ def parse_axes(text: str) -> tuple[list[int], list[float]]:
     sensor's x, y and z: ``forward-left-up``, which is equivalent. Returns `axis`: sensor axis of
     each body axis, 0 to 2. ConfigError: the text is not a signed permutation of three axes.
     """
-    if said := _directions(text):
-        return said
+    words = re.split(r"[\s,\-]+", text.strip().lower())
+    if len(words) == 3 and all(w in _DIRECTIONS for w in words):
+        said = [_DIRECTIONS[w] for w in words]
+        if sorted(body for body, _ in said) != [0, 1, 2]:
+            raise ConfigError("io.axes-name-direction-twice", quantity="--axes", text=text)
+        axis = [next(k for k, (body, _) in enumerate(said) if body == b) for b in range(3)]
+        return axis, [said[k][1] for k in axis]
     parts = [p.strip().lower() for p in text.split(",")]
     names = [p.lstrip("+-") for p in parts]
     if sorted(names) != ["x", "y", "z"] or any(
@@ -526,15 +531,3 @@ def parse_axes(text: str) -> tuple[list[int], list[float]]:
     ):
         raise ConfigError("io.axes-not-three", quantity="--axes", text=text)
     return [_AXES.index(n) for n in names], [-1.0 if p.startswith("-") else 1.0 for p in parts]
-
-
-def _directions(text: str) -> tuple[list[int], list[float]] | None:
-    """Convert directions of the sensor's x, y, z in words to sensor axes of the body axes."""
-    words = re.split(r"[\s,\-]+", text.strip().lower())
-    if len(words) != 3 or any(w not in _DIRECTIONS for w in words):
-        return None
-    said = [_DIRECTIONS[w] for w in words]
-    if sorted(body for body, _ in said) != [0, 1, 2]:
-        raise ConfigError("io.axes-name-direction-twice", quantity="--axes", text=text)
-    axis = [next(k for k, (body, _) in enumerate(said) if body == b) for b in range(3)]
-    return axis, [said[k][1] for k in axis]

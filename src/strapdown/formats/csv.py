@@ -116,8 +116,7 @@ def _at_once(
         return None
     if not text or "\0" in text or _BREAKS.search(text):
         return None
-    numbered, comments = _numbered(text)
-    _refuse_wide(numbered, name)
+    numbered, comments = _numbered(text, name)
     if not numbered or _rewritten(numbered) is not numbered:
         return None
     top = _Top(numbered, comments, name, kinds)
@@ -146,10 +145,9 @@ def _line_by_line(
     data: bytes, name: str, files: tuple[Path, ...], kinds: Sequence[str] = OF_LOGS
 ) -> RawLog:
     text, findings = decoded(data, name)
-    numbered, comments = _numbered(text)
+    numbered, comments = _numbered(text, name)
     if not numbered:
         raise DataError("io.file-holds-comments-alone" if comments else "io.file-empty", file=name)
-    _refuse_wide(numbered, name)
     top = _Top(_rewritten(numbered), comments, name, kinds)
     if not top.data:
         raise DataError("io.csv-without-rows", file=name, row=numbered[0][0])
@@ -161,19 +159,16 @@ def _line_by_line(
     return top.log(name, files, columns, np.array(rows), findings)
 
 
-def _numbered(text: str) -> tuple[Lines, list[str]]:
-    """Split into non-blank lines with their row numbers, and the comments at the top."""
+def _numbered(text: str, name: str = "") -> tuple[Lines, list[str]]:
+    """Split into non-blank lines with their row numbers, and the comments at the top.
+
+    `name`: for messages. DataError: one of the first lines has more than `MOST_COLUMNS` fields,
+    which no log has; no pattern is searched in it.
+    """
     numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
     comments = [line for _, line in itertools.takewhile(lambda n: is_comment(n[1]), numbered)]
-    return numbered[len(comments) :], comments
-
-
-def _refuse_wide(numbered: Lines, name: str) -> None:
-    """Refuse a line of more fields than a log has, before any pattern is searched in it.
-
-    DataError: one of the first lines has more than `MOST_COLUMNS` fields.
-    """
-    for row, line in numbered[:SEARCHED]:
+    numbered = numbered[len(comments) :]
+    for row, line in numbered[: SEARCHED if name else 0]:
         if len(line) < 2 * MOST_COLUMNS:
             continue
         count = 1 + max(line.count(separator) for separator in ",;\t|")
@@ -182,6 +177,7 @@ def _refuse_wide(numbered: Lines, name: str) -> None:
             raise DataError(
                 "io.csv-too-many-columns", file=name, row=row, count=count, most=MOST_COLUMNS
             )
+    return numbered, comments
 
 
 # Lines that are rows in another form.
@@ -381,11 +377,11 @@ def one_line_a_sample(numbered: Lines) -> Lines:
     return out
 
 
-def _axes(name: str, unit: str) -> list[str]:
-    return [f"{name}_{axis} [{unit}]" for axis in "xyz"]
-
-
-_SENSED = [*_axes("mag", "gauss"), *_axes("accel", "m/s2"), *_axes("gyro", "rad/s")]
+_SENSED = [
+    f"{name}_{axis} [{unit}]"
+    for name, unit in (("mag", "gauss"), ("accel", "m/s2"), ("gyro", "rad/s"))
+    for axis in "xyz"
+]
 _YAW = ["yaw [deg]", "pitch [deg]", "roll [deg]"]
 #: Fields of sentences (VectorNav, Interface Control Documents of VN-100 and VN-200).
 SENTENCES = {
@@ -393,7 +389,7 @@ SENTENCES = {
     "$VNYMR": [*_YAW, *_SENSED],
     "$VNQMR": ["quat_x", "quat_y", "quat_z", "quat_w", *_SENSED],
     "$VNMAR": _SENSED,
-    "$VNYBA": [*_YAW, *[f"linear {n}" for n in _axes("accel", "m/s2")], *_axes("gyro", "rad/s")],
+    "$VNYBA": [*_YAW, *[f"linear {n}" for n in _SENSED[3:6]], *_SENSED[6:]],
 }
 
 
@@ -631,7 +627,11 @@ def _first_row(numbered: Lines, kinds: Sequence[str]) -> tuple[int, str | None, 
     like = [bool(usual) and d and f == usual[0][0] for f, d in zip(forms, data, strict=True)]
     for k in np.flatnonzero(like).tolist():
         after = like[k + 1 : k + 3]
-        if _above_names(numbered, forms, data, k):
+        # A line with empty fields is of a preamble if the names, all there, are soon below.
+        if not all(fields_of(numbered[k][1], forms[k][0])) and any(
+            forms[m] == forms[k] and not data[m] and all(fields_of(numbered[m][1], forms[m][0]))
+            for m in range(k + 1, min(k + 1 + PREAMBLE, len(forms)))
+        ):
             continue
         if k == 1:
             break
@@ -653,19 +653,6 @@ def _first_row(numbered: Lines, kinds: Sequence[str]) -> tuple[int, str | None, 
     separator = separator_of(numbered[0][1])
     names = fields_of(numbered[0][1], separator)
     return 1, separator, len(names) - (len(names) > 1 and not names[-1])
-
-
-def _above_names(
-    numbered: Lines, forms: list[tuple[str | None, int]], data: list[bool], k: int
-) -> bool:
-    """Whether a line with empty fields is of a preamble: the names, all there, are soon below."""
-    if all(fields_of(numbered[k][1], forms[k][0])):
-        return False
-    below = range(k + 1, min(k + 1 + PREAMBLE, len(forms)))
-    return any(
-        forms[m] == forms[k] and not data[m] and all(fields_of(numbered[m][1], forms[m][0]))
-        for m in below
-    )
 
 
 def are_data(fields: list[str]) -> bool:

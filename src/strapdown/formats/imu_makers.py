@@ -16,7 +16,7 @@ from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import GPS, UNIX, WEEK, usual_step
 from strapdown.formats.columns import read_name
 from strapdown.formats.hdf5 import SIGNATURE, outline, read_arrays
-from strapdown.formats.known_formats import column, lacking, selected, split, stated_by, under
+from strapdown.formats.known_formats import column, lacking, selected, stated_by, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, first_bytes, head
 from strapdown.units import TIME_UNITS, unit_of
@@ -66,9 +66,9 @@ def _csv(path: Path) -> RawLog:
     top = next((k for k, line in enumerate(lines) if line.startswith("Time,")), None)
     if top is None or len(lines) < top + 3:
         raise DataError("io.csv-without-rows", file=path.name, row=len(lines))
-    names, units = (split(lines[top + k], ",") for k in (0, 1))
+    names, units = (csv.fields_of(lines[top + k], ",") for k in (0, 1))
     # Rows may end in a comma, which the names do not.
-    more = split(lines[top + 2], ",")[len(names) :]
+    more = csv.fields_of(lines[top + 2], ",")[len(names) :]
     header = ",".join([*names, *(f"unnamed {k}" for k in range(len(more)))])
     raw = under(path, top, header=header, drop=1)
     said = dict(zip(names, units, strict=False))

@@ -101,16 +101,7 @@ def from_json(path: Path) -> Any:
 def names_of(path: Path) -> list[str]:
     """Return the names in the first line, for format detection."""
     lines = head(path).splitlines()
-    return split(lines[0]) if lines else []
-
-
-def split(line: str, separator: str | None = "") -> list[str]:
-    """Split a line into fields, by its own separator; quotes that do not close are text."""
-    by = csv.separator_of(line) if separator == "" else separator
-    try:
-        return csv.fields_of(line, by)
-    except Exception:  # of the standard library: a quote that does not close, a long field
-        return [field.strip() for field in line.split(by)]
+    return csv.fields_of(lines[0], csv.separator_of(lines[0])) if lines else []
 
 
 def lacking(path: Path, stream: str, title: str, streams: Iterable[str]) -> DataError:

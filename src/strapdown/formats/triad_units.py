@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.arrays import as_rows, numbers
 from strapdown.formats.columns import parse_axes, read_name
 from strapdown.formats.find_columns import AXES, Column
@@ -61,11 +61,11 @@ class LogInUse:
 
     def note(self, code: str, quantity: str, **data: Any) -> None:
         """Add a note about the log."""
-        self.warn(code, quantity, severity="note", **data)
+        add_note(self.findings, code, file=self.raw.name, quantity=quantity, **data)
 
     def warn(self, code: str, quantity: str, **data: Any) -> None:
         """Add a warning about the log, unless `data` have another severity."""
-        self.findings.append(Finding(code, file=self.raw.name, quantity=quantity, **data))
+        add_warning(self.findings, code, file=self.raw.name, quantity=quantity, **data)
 
     def columns(self, triad: str) -> list[Column]:
         """Return the columns of the three axes."""
