@@ -66,10 +66,6 @@ def align(
     progress : callable, optional
         Called with a stage and the completed fraction.
 
-    Returns
-    -------
-    AlignmentRun
-
     Raises
     ------
     ConfigError
@@ -134,10 +130,6 @@ def specify_alignment(
         The module with its options, including ``kind``.
     called : callable
         Name of an argument in the interface, for messages: ``sensor`` as ``--sensor``.
-
-    Returns
-    -------
-    AlignmentSpec
 
     Raises
     ------
@@ -206,10 +198,6 @@ def outage(
         Tables and keys of the configuration: ``motion={"speed_m_per_s": 15.0}``,
         ``start={"heading_sd_deg": 1.0}``, ``aiding={"no_slip": {}}``; for a run ``places``,
         ``at_s``, ``from_s``, ``to_s``, ``duration_s``.
-
-    Returns
-    -------
-    OutageRun
 
     Raises
     ------

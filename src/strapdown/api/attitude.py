@@ -593,10 +593,6 @@ def compare_attitude(
         Fields of `AttitudeOptions` that replace those of `options`: ``rates_hz=[100, 50]``,
         ``tolerance_deg=0.5``, ``reference="end same as start"``.
 
-    Returns
-    -------
-    AttitudeComparison
-
     Raises
     ------
     DataError

@@ -174,10 +174,6 @@ def reconstruct(
     progress : callable, optional
         Called with a stage and the completed fraction.
 
-    Returns
-    -------
-    CrashRun
-
     Raises
     ------
     ConfigError

@@ -205,10 +205,6 @@ def navigate(
     progress : callable, optional
         Called with a stage and the completed fraction.
 
-    Returns
-    -------
-    NavigationRun
-
     Raises
     ------
     ConfigError
@@ -272,10 +268,6 @@ def specify_navigation(
         As `navigate`.
     called : callable
         Name of an argument in the interface, for messages: ``sensor`` as ``--sensor``.
-
-    Returns
-    -------
-    NavigationSpec
 
     Raises
     ------

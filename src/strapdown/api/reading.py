@@ -155,10 +155,6 @@ class Imu(_Table):
             Specific force, forward-right-down: about (0, 0, -9.8) at rest and level.
         sampling : {'instantaneous', 'mean'}
 
-        Returns
-        -------
-        Imu
-
         Raises
         ------
         DataError
@@ -460,10 +456,6 @@ def imu_input(source: Any) -> ImuFile | pd.DataFrame:
     source : str, Path, ImuFile, DataFrame, or (t, gyro, accel)
         An unchanged Imu from `read_imu` is represented by its file. A DataFrame has the columns of
         an Imu table, and its time in s as index or in a column ``time``.
-
-    Returns
-    -------
-    ImuFile or DataFrame
 
     Raises
     ------

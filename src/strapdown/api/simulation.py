@@ -159,10 +159,6 @@ def simulate(
     recorders : sequence of str
         For a crash: names of its recorders, or ``all``.
 
-    Returns
-    -------
-    Simulation
-
     Raises
     ------
     ConfigError

@@ -85,10 +85,6 @@ def barometer_table(
     source : str, optional
         Name for messages.
 
-    Returns
-    -------
-    DataFrame
-
     Raises
     ------
     DataError
@@ -113,10 +109,6 @@ def barometer_from_pressure(
     pressure_sd_pa : array_like, (n,) or float, Pa
     source : str, optional
         Name for messages.
-
-    Returns
-    -------
-    DataFrame
 
     Raises
     ------
@@ -177,10 +169,6 @@ def body_velocity_table(
     source : str, optional
         Name for messages.
 
-    Returns
-    -------
-    DataFrame
-
     Raises
     ------
     DataError
@@ -230,10 +218,6 @@ def heading_table(
         Standard deviation of the noise of each heading; infinite where not measured.
     source : str, optional
         Name for messages.
-
-    Returns
-    -------
-    DataFrame
 
     Raises
     ------
@@ -300,10 +284,6 @@ def odometer_table(
         Standard deviation of the noise, without the scale factor; infinite where not measured.
     source : str, optional
         Name for messages.
-
-    Returns
-    -------
-    DataFrame
 
     Raises
     ------

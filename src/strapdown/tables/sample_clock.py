@@ -130,10 +130,6 @@ def sample_clock(stamps: Array, values: Array | None = None) -> SampleClock:
         A motion is smoother on the instants at which it was sampled than on any others: the values
         decide between scattered stamps and an even clock. Without them, or without motion,
         scattered stamps are left as they are.
-
-    Returns
-    -------
-    SampleClock
     """
     stamps = np.asarray(stamps, dtype=np.float64)
     gaps, in_bursts = _gaps(stamps)
