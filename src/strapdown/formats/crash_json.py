@@ -55,9 +55,8 @@ def write_crash_json(path: str | Path, record: CrashRecord) -> None:
         if bad.size:
             raise DataError(
                 "io.not-finite-number",
-                file=channel.file or None,
+                **channel.where,
                 row=channel.row(int(bad[0])),
-                quantity=f"channel {channel.name}",
                 values=values[bad[0]],
             )
         key = time.tobytes()

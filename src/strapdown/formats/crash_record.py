@@ -118,6 +118,11 @@ class CrashChannel:
     dummy: str = ""
 
     @property
+    def where(self) -> dict[str, Any]:
+        """Location of the channel, for findings."""
+        return {"file": self.file or None, "quantity": f"channel {self.name}"}
+
+    @property
     def failure(self) -> str:
         """Remark by which the laboratory says that the channel failed; empty if none."""
         return next((r for r in self.remarks if any(f in r.lower() for f in _FAILED)), "")
@@ -195,9 +200,8 @@ def refuse_impossible(channel: CrashChannel, values: NDArray[Any]) -> None:
     if beyond.size:
         raise DataError(
             "io.crash-value-impossible",
-            file=channel.file or None,
+            **channel.where,
             row=channel.row(int(beyond[0])),
-            quantity=f"channel {channel.name}",
             value=float(values[beyond[0]]),
             unit=unit,
             count=int(beyond.size),

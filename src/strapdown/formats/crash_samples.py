@@ -212,7 +212,7 @@ def means_from_zero(time: ArrayLike, velocity: ArrayLike, channel: CrashChannel)
     """
     t = np.asarray(time, dtype=np.float64)
     v = np.asarray(velocity, dtype=np.float64)
-    where: dict[str, Any] = {"file": channel.file or None, "quantity": f"channel {channel.name}"}
+    where = channel.where
     if t.size < 2:
         raise DataError("io.sample-no-change-velocity", size=t.size, **where)
     step = float(np.median(np.diff(t)))
@@ -241,7 +241,7 @@ def means_from_zero(time: ArrayLike, velocity: ArrayLike, channel: CrashChannel)
 
 def of_start(found: FromZero, channel: CrashChannel, unit: float = 1.0) -> list[Finding]:
     """Findings of a table that begins late, or not at zero; `unit`: factor to m/s."""
-    where: dict[str, Any] = {"file": channel.file or None, "quantity": f"channel {channel.name}"}
+    where = channel.where
     findings: list[Finding] = []
     if found.late:
         add_warning(findings, "io.delta-v-begins-late", **where, first=found.late)

@@ -171,12 +171,7 @@ def _tell_axis(channel: CrashChannel, axis: str, sign: float, findings: list[Fin
     taken = f"{'-' if sign < 0 else ''}{axis}"
     if channel.axis != taken:
         add_warning(
-            findings,
-            "io.record-along-taken-along",
-            file=channel.file or None,
-            quantity=f"channel {channel.name}",
-            axis=channel.axis,
-            taken=taken,
+            findings, "io.record-along-taken-along", **channel.where, axis=channel.axis, taken=taken
         )
 
 
@@ -206,19 +201,13 @@ def _as_mean(
     from strapdown.formats.crash_samples import mean_accelerations_of, means_from_zero, of_start
 
     if stamps.size < 2:
-        raise DataError(
-            "io.sample-no-change-velocity",
-            file=channel.file or None,
-            quantity=f"channel {channel.name}",
-            size=stamps.size,
-        )
+        raise DataError("io.sample-no-change-velocity", **channel.where, size=stamps.size)
     _check_finite(channel, stamps, values)
     from_zero = channel.from_zero
     add_note(
         findings,
         "io.velocity-made-means-from-zero" if from_zero else "io.velocity-made-means",
-        file=channel.file or None,
-        quantity=f"channel {channel.name}",
+        **channel.where,
     )
     if not from_zero:
         return mean_accelerations_of(stamps, values)
@@ -229,11 +218,7 @@ def _as_mean(
 
 def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:
     if not values.size:
-        raise DataError(
-            "io.channel-without-samples",
-            file=channel.file or None,
-            quantity=f"channel {channel.name}",
-        )
+        raise DataError("io.channel-without-samples", **channel.where)
     refuse_impossible(channel, values)
     there = np.flatnonzero(np.isfinite(values))
     endless = np.flatnonzero(np.isinf(values))
@@ -252,9 +237,8 @@ def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:
     count = int((~np.isfinite(values)).sum())
     raise DataError(
         "io.not-finite-number-such",
-        file=channel.file or None,
+        **channel.where,
         row=channel.row(hole),
-        quantity=f"channel {channel.name}",
         values=values[hole],
         stamps=stamps[hole],
         count=count,
@@ -383,8 +367,7 @@ def _same_length(
     if stamps.size != values.size:
         raise DataError(
             "io.samples-channel-stamps",
-            file=channel.file or None,
-            quantity=f"channel {channel.name}",
+            **channel.where,
             size=values.size,
             name=name,
             size_2=stamps.size,
@@ -541,8 +524,7 @@ def triad_factor(
             add_note(
                 findings,
                 "io.record-says-not-known-read",
-                file=channel.file or None,
-                quantity=f"channel {channel.name}",
+                **channel.where,
                 unit=channel.unit,
                 wanted=wanted,
             )

@@ -97,16 +97,7 @@ def write_mme(
     DataError
         The record has no channels, more than 999, or an infinite value.
     """
-    # A column of stamps is written together with the channels that use it.
-    channels = [c for c in record.channels if c.quantity != "time"]
-    if not channels or len(channels) > MOST_CHANNELS:
-        raise DataError(
-            "io.channels-iso-mme-holds",
-            file=record.path.name,
-            quantity="channels",
-            count=len(channels),
-            most_channels=MOST_CHANNELS,
-        )
+    channels = _written(record)
     stem = _FILE_NAME.sub("_", name if name is not None else record.path.stem).strip("_")
     stem = stem[:LONGEST_FILE_NAME] or _SHORTEST
     codes = _codes(channels)
@@ -132,6 +123,23 @@ def write_mme(
         (inner / f"{stem}.{k:03d}").write_bytes(text.encode())
     (inner / f"{stem}.chn").write_bytes(_lines(index))
     return codes
+
+
+def _written(record: CrashRecord) -> list[CrashChannel]:
+    """Return the channels but those of stamps, which are written with the channels that use them.
+
+    DataError: there are none, or more than a test can number.
+    """
+    channels = [c for c in record.channels if c.quantity != "time"]
+    if not channels or len(channels) > MOST_CHANNELS:
+        raise DataError(
+            "io.channels-iso-mme-holds",
+            file=record.path.name,
+            quantity="channels",
+            count=len(channels),
+            most_channels=MOST_CHANNELS,
+        )
+    return channels
 
 
 def _codes(channels: list[CrashChannel]) -> dict[str, str]:
@@ -181,9 +189,8 @@ def _check(channel: CrashChannel, time: Array, values: Array) -> None:
     if bad.size or not values.size:
         raise DataError(
             "io.not-finite-number" if bad.size else "io.no-samples-2",
-            file=channel.file or None,
+            **channel.where,
             row=channel.row(int(bad[0])) if bad.size else None,
-            quantity=f"channel {channel.name}",
             values=values[bad[0]] if bad.size else None,
         )
 
@@ -362,15 +369,7 @@ def write_nhtsa(
         The record has no channels, more than 999, a value that is not finite, uneven stamps, or a
         channel on a moving part for which the database has no code.
     """
-    channels = [c for c in record.channels if c.quantity != "time"]
-    if not channels or len(channels) > MOST_CHANNELS:
-        raise DataError(
-            "io.channels-iso-mme-holds",
-            file=record.path.name,
-            quantity="channels",
-            count=len(channels),
-            most_channels=MOST_CHANNELS,
-        )
+    channels = _written(record)
     test = "".join(c for c in record.facts.get("test", "") if c.isdecimal())
     stem = _FILE_NAME.sub("_", name or f"v{int(test or 1):05d}").strip("_") or _SHORTEST
     numbers = _curves(channels)
@@ -439,21 +438,12 @@ def _ev5_channel(
     if np.isnan(values).any():
         k = int(np.flatnonzero(np.isnan(values))[0])
         raise DataError(
-            "io.not-finite-number",
-            file=channel.file or None,
-            row=channel.row(k),
-            quantity=f"channel {channel.name}",
-            values=values[k],
+            "io.not-finite-number", **channel.where, row=channel.row(k), values=values[k]
         )
     first, interval = _ev5_steps(channel, time)
     location, seat = code_of_place(channel.point, channel.body, channel.place)
     if not location:
-        raise DataError(
-            "io.part-without-location-code",
-            file=channel.file or None,
-            quantity=f"channel {channel.name}",
-            body=channel.body,
-        )
+        raise DataError("io.part-without-location-code", **channel.where, body=channel.body)
     kind, unit = _EV5_KINDS[channel.quantity]
     *_, factor = si_of(unit) or ("", 1.0)
     axis = channel.axis.lstrip("-").upper()
@@ -485,12 +475,7 @@ def _ev5_steps(channel: CrashChannel, time: Array) -> tuple[int, str]:
             off = np.abs(time - step * (first + np.arange(time.size)))
             if off.max() <= nhtsa.STAMP_ROUNDING:
                 return first, interval
-    raise DataError(
-        "io.stamps-not-even",
-        file=channel.file or None,
-        quantity=f"channel {channel.name}",
-        interval=mean,
-    )
+    raise DataError("io.stamps-not-even", **channel.where, interval=mean)
 
 
 def _ev5_test(record: CrashRecord, count: int) -> list[str]:
