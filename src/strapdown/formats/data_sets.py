@@ -235,7 +235,7 @@ ALT, SPEED = "Height above ellipsoid (GT Height) [m]", "Velocity (GT Velocity) [
 detect_smartloc = Signs(text=r"\A" + "".join(f"(?=.*{re.escape(n)})" for n in (*FIRST, LAT, LON)))
 
 
-def read_smartloc(path: Path) -> RawLog:
+def read_smartloc_fixes(path: Path) -> RawLog:
     """Read position and velocity of the reference, once an epoch.
 
     DataError: a column is missing, or a value is not a number.

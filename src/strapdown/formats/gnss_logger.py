@@ -322,7 +322,7 @@ detect_pseudoranges = Signs(
 )
 
 
-def read_challenge(path: Path) -> RawLog:
+def read_challenge_fixes(path: Path) -> RawLog:
     """Read the positions of the reference receiver."""
     raw = under(path)
     held = {"time": (unix_from_gps(column(raw, "millisSinceGpsEpoch") * 1e-3), "s")}

@@ -366,7 +366,7 @@ def read_folder_fixes(path: Path) -> Fixes:
     return read_fixes(_of_folder(path, "gnss", _are_fixes))
 
 
-def read_folder_trajectory(path: Path) -> pd.DataFrame:
+def read_folder_reference(path: Path) -> pd.DataFrame:
     """Read the trajectory of a folder."""
     return read_trajectory(_of_folder(path, "reference", detect_trajectory))
 

@@ -136,7 +136,7 @@ def read_fixes(path: Path) -> Fixes:
     )
 
 
-def read_trajectory(path: Path) -> pd.DataFrame:
+def read_reference(path: Path) -> pd.DataFrame:
     """Read the unit's own solution as a trajectory.
 
     Parameters
@@ -266,21 +266,21 @@ def _are_rotations(values: Array) -> NDArray[np.bool_]:
     return np.asarray((off < _ORTHOGONAL) & (np.linalg.det(turn) > 0.0))
 
 
-detect_poses = Signs(
+detect_odometry = Signs(
     suffixes=csv.SUFFIXES,
     text=r"^[ \t]*(?:[^\s,#]+[ \t]+){11}[^\s,#]+[ \t\r]*$",
     also=_has_poses,
 )
 
 
-def files_of_poses(path: Path) -> tuple[Path, ...]:
+def files_of_odometry(path: Path) -> tuple[Path, ...]:
     """List the poses, and the stamps beside them or in the folder of their sequence."""
     sequence = path.absolute().parent.parent / "sequences" / path.stem
     beside = (path.parent / "times.txt", sequence / "times.txt")
     return (path, *[p for p in beside if p.is_file() and p != path][:1])
 
 
-def read_poses(path: Path) -> pd.DataFrame:
+def read_odometry_reference(path: Path) -> pd.DataFrame:
     """Read a trajectory whose comments state where its first pose is.
 
     DataError: they do not, a stamp is missing, or a row is not a pose.
@@ -295,7 +295,7 @@ def read_poses(path: Path) -> pd.DataFrame:
         bad = int(np.argmin(good))
         raise DataError("io.pose-without-rotation", file=path.name, row=raw.row(bad))
     time: Array = np.zeros(0)
-    for stamps in files_of_poses(path)[1:]:
+    for stamps in files_of_odometry(path)[1:]:
         time = np.asarray(next(iter(csv.read(stamps).columns.values())), dtype=np.float64)
     if time.size != len(values):
         raise DataError(

@@ -37,7 +37,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK, Clock
-from strapdown.formats.known_formats import Quantities, damage, solution
+from strapdown.formats.known_formats import Quantities, damage, or_sentences, solution
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.units import LENGTHS
@@ -236,6 +236,7 @@ def read(path: Path) -> RawLog:
     )
 
 
+@or_sentences
 def read_fixes(path: Path) -> RawLog:
     """Read BESTPOS, with the velocity of BESTVEL at the same instants."""
     frames, findings = _read(path, "gnss")
@@ -317,7 +318,7 @@ detect_explorer = Signs(
 )
 
 
-def read_explorer(path: Path) -> pd.DataFrame:
+def read_explorer_reference(path: Path) -> pd.DataFrame:
     """Read position, velocity and attitude."""
     with damage(path):
         text, findings = csv.decoded(path.read_bytes(), path.name)

@@ -19,7 +19,7 @@ from strapdown.earth import radii_of_curvature
 from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats.clocks import GPS, RELATIVE, WEEK, Clock, gps_from_unix
 from strapdown.formats.join import join
-from strapdown.formats.known_formats import Quantities, damage, solution
+from strapdown.formats.known_formats import Quantities, damage, or_sentences, solution
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.frames import C_ne, geodetic_from_ecef
@@ -127,6 +127,7 @@ def _week(message: Any) -> float:
     return float(np.round((gps_from_unix(unix)[0] - message.iTOW * 1e-3) / WEEK))
 
 
+@or_sentences
 def read_ubx_fixes(path: Path) -> RawLog:
     """Read the fixes, at GPS seconds of week."""
     fixed, out, findings = _solved(path, "gnss")
@@ -301,6 +302,7 @@ def _read(path: Path, stream: str) -> Blocks:
     return found
 
 
+@or_sentences
 def read_sbf_fixes(path: Path) -> RawLog:
     """Read position, velocity and their standard deviations."""
     found = _read(path, "gnss")
@@ -419,7 +421,7 @@ def _has_records(path: Path) -> bool:
 detect_sbet = Signs(first=rb"\A.{7}[\x3f-\x41]", also=_has_records)
 
 
-def read_sbet(path: Path) -> pd.DataFrame:
+def read_sbet_reference(path: Path) -> pd.DataFrame:
     """Read position, velocity and attitude."""
     findings: list[Finding] = []
     with damage(path):

@@ -111,7 +111,9 @@ def while_unchanged(most: int) -> Callable[[Callable[[Path], T]], Callable[[Path
 
     def decorated(read: Callable[[Path], T]) -> Callable[[Path], T]:
         kept = lru_cache(maxsize=most)(lambda path, _state: read(path))
-        return wraps(read)(lambda path: kept(path, state_of(path)))
+        found = wraps(read)(lambda path: kept(path, state_of(path)))
+        vars(found)["cache_clear"] = kept.cache_clear
+        return found
 
     return decorated
 

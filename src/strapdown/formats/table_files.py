@@ -35,7 +35,7 @@ from strapdown.tables.on_disk import room
 detect_excel = Signs(suffixes=(".xlsx", ".xlsm"), first=rb"\APK\x03\x04")
 
 
-def read_excel(path: Path) -> RawLog:
+def read_excel_table(path: Path) -> RawLog:
     """Read the sheet with the most numbers.
 
     DataError: the library is missing, the file is damaged, or no sheet has numbers.
@@ -109,7 +109,7 @@ def _begins(path: Path) -> bool:
 detect_json = Signs(suffixes=(*JSON_SUFFIXES, ".txt", ".log"), text=r"\A\s*+[\[{]", also=_begins)
 
 
-def read_json(path: Path) -> RawLog:
+def read_json_table(path: Path) -> RawLog:
     """Read the members of the objects as columns, missing ones as NaN.
 
     DataError: a line is not JSON, a value is neither a number nor a text, or the file has no
@@ -246,7 +246,7 @@ LABVIEW_MAGIC, END = "LabVIEW Measurement", "***End_of_Header***"
 detect_labview = Signs(text=rf"\A{LABVIEW_MAGIC}")
 
 
-def read_labview(path: Path) -> RawLog:
+def read_labview_table(path: Path) -> RawLog:
     """Read the channels, with the units that the header states.
 
     DataError: the header does not end, or a second one follows the rows.
@@ -280,7 +280,7 @@ def read_labview(path: Path) -> RawLog:
 detect_numpy = Signs(named=(".npz",))
 
 
-def read_numpy(path: Path) -> RawLog:
+def read_numpy_table(path: Path) -> RawLog:
     """Read the arrays of a NumPy archive; its content is never executed.
 
     DataError: the file is not an archive, is damaged, declares too much data, or holds Python
@@ -335,7 +335,7 @@ detect_numpy_folder = Signs(
 )
 
 
-def read_numpy_folder(path: Path) -> RawLog:
+def read_numpy_folder_table(path: Path) -> RawLog:
     """Read every array of the folder, each under its file name.
 
     Returns arrays that differ in length from the gyro's are dropped and listed. DataError: an array

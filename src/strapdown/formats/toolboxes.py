@@ -613,7 +613,7 @@ def read_python_ins_fixes(path: Path) -> Fixes:
     return Fixes(path.name, time, place, np.arange(1, time.size + 1))
 
 
-def read_python_ins_truth(path: Path) -> pd.DataFrame:
+def read_python_ins_reference(path: Path) -> pd.DataFrame:
     """Read the trajectory."""
     time, truth = _arrays(path, "reference", 9)
     table = trajectory_table(time, truth[:, :3], truth[:, 3:6], truth[:, 6:], source=path.name)

@@ -47,7 +47,7 @@ QUALITY = {"none": 0.0, "dgps": 2.0, "pps": 3.0}
 detect_gpx = Signs(text=r"\A[\s\S]{0,4092}?<gpx")
 
 
-def read_gpx(path: Path) -> RawLog:
+def read_gpx_fixes(path: Path) -> RawLog:
     """Read the points that have a time.
 
     DataError: the library is missing, the XML is damaged, or no point has a time.
@@ -360,7 +360,7 @@ def _has_positions(path: Path) -> bool:
 detect_dji = Signs(text=r"\A[\s\S]{0,4080}?\d:\d\d:\d\d[,.]\d{1,3}\s*-->", also=_has_positions)
 
 
-def read_dji(path: Path) -> RawLog:
+def read_dji_fixes(path: Path) -> RawLog:
     """Read the positions.
 
     DataError: no subtitle has a position, or the angles may be in radians.
