@@ -33,6 +33,8 @@ OWN_NEAREST = {"attitude.hz-asked-hz"}
 #: Functions that append a finding to their first argument; its code is the second.
 APPENDED = {"add_note", "add_warning"}
 RAISED = {"Finding", "DataError", "ConfigError", "DivergenceError", "check_choice", *APPENDED}
+#: Methods of the readers that add the location to a code and data.
+LOCATED = {"fault", "_fault", "note", "warn"}
 
 
 def _name(node: ast.Call) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -217,13 +218,7 @@ def _in_si(header: MmeHeader, key: str) -> float:
     unit = find_unit(text, ("velocity",)) if text and key.startswith("velocity") else None
     factor = FACTORS[unit[0]][unit[1]] if unit else 1.0 if text in _SI_OF[key.split()[0]] else None
     if value is None or factor is None:
-        raise DataError(
-            "io.no-number",
-            file=header.file,
-            row=header.line(key),
-            quantity=key,
-            text=header.text(key)[:60],
-        )
+        raise header.fault("io.no-number", key, text=header.text(key)[:60])
     return value * factor
 
 
@@ -390,13 +385,7 @@ def stamps_of(
             text = held.header.text("unit")
             unit = find_unit(text, OF_CRASHES) if text else ("time", "s")
             if unit is None or unit[0] != "time":
-                raise DataError(
-                    "io.holds-stamps-unit",
-                    file=held.path.name,
-                    row=held.header.line("unit"),
-                    quantity="unit",
-                    text=text[:40],
-                )
+                raise held.header.fault("io.holds-stamps-unit", "unit", text=text[:40])
             stamps = read_samples(held.path, held.header, f"channel {clock}")
             if stamps.size != count:
                 raise DataError(
@@ -425,15 +414,9 @@ def stamps_of(
     def even(count: int) -> Array:
         interval = header.number("sampling interval")
         if interval is None or not interval > 0.0:
-            raise DataError(
-                "io.sampling-interval-not-stated"
-                if interval is None
-                else "io.sampling-interval-none",
-                file=file.path.name,
-                row=header.line("sampling interval"),
-                quantity="sampling interval",
-                interval=interval,
-            )
+            missing = "io.sampling-interval-not-stated"
+            code = missing if interval is None else "io.sampling-interval-none"
+            raise header.fault(code, "sampling interval", interval=interval)
         first = "0"
         if header.number("time of first sample") is not None:
             first = header.text("time of first sample").split()[0]
@@ -645,6 +628,10 @@ class MmeHeader:
         """Return the line number of a key."""
         return self.values[key][1] if key in self.values else None
 
+    def fault(self, code: str, key: str, **data: Any) -> DataError:
+        """Make the error for the value of a key."""
+        return DataError(code, file=self.file, row=self.line(key), quantity=key, **data)
+
     def number(self, key: str) -> float | None:
         """Return the value of a key as a number, with or without a unit after it.
 
@@ -655,9 +642,7 @@ class MmeHeader:
             return None
         value = read_number(text.split()[0])
         if value is None or not np.isfinite(value):
-            raise DataError(
-                "io.no-number", file=self.file, row=self.line(key), quantity=key, text=text[:60]
-            )
+            raise self.fault("io.no-number", key, text=text[:60])
         return value
 
 
