@@ -67,47 +67,32 @@ _WORD = re.compile(r"[^\W\d_]+|\d+")
 
 @dataclass(frozen=True)
 class ColumnName:
-    """Quantity, axis and unit as read from the name of a column.
+    """Quantity, axis and unit as read from the name of a column."""
 
-    Attributes
-    ----------
-    quantity : str or None
-        Of the vocabulary; of a sensor with its axis, ``gyro_x``, or a triad's name where the column
-        holds three numbers or the name ends in a number.
-    unit : str or None
-        In the spelling of this package; as written where it is none of the vocabulary's.
-    loose : int
-        Evidence: 0 for a name that is known as it is, 1 behind a word such as ``gps_``, in another
-        order, or with an axis that is only likely, 2 if only some words are known.
-    family : str
-        Of a sensor: the name without its axis. Columns of one sensor share it. One letter may mean
-        anything.
-    linear : bool
-        The name says acceleration without gravity, as phones have it; in ROS it has gravity.
-    increment : bool
-        The name says increments per sample.
-    number : int or None
-        At the end of the name of a triad: ``gyro_1``.
-    sign : float
-        -1 for the opposite of the quantity: a velocity up.
-    axis : str
-        In a crash record: ``x y z``, with a minus if the name states it, or empty.
-    change : bool
-        In a crash record: a velocity that is a change since time zero.
-    spoken : str
-        In a crash record: the quantity that the words say, where the unit is of another one.
-    """
-
+    #: Of the vocabulary; of a sensor with its axis, ``gyro_x``, or a triad's name where the column
+    #: holds three numbers or the name ends in a number.
     quantity: str | None
+    #: In the spelling of this package; as written where it is none of the vocabulary's.
     unit: str | None = None
+    #: Evidence: 0 for a name that is known as it is, 1 behind a word such as ``gps_``, in another
+    #: order, or with an axis that is only likely, 2 if only some words are known.
     loose: int = 0
+    #: Of a sensor: the name without its axis. Columns of one sensor share it. One letter may mean
+    #: anything.
     family: str = ""
+    #: The name says acceleration without gravity, as phones have it; in ROS it has gravity.
     linear: bool = False
+    #: The name says increments per sample.
     increment: bool = False
+    #: At the end of the name of a triad: ``gyro_1``.
     number: int | None = None
+    #: -1 for the opposite of the quantity: a velocity up.
     sign: float = 1.0
+    #: In a crash record: ``x y z``, with a minus if the name states it, or empty.
     axis: str = ""
+    #: In a crash record: a velocity that is a change since time zero.
     change: bool = False
+    #: In a crash record: the quantity that the words say, where the unit is of another one.
     spoken: str = ""
 
 

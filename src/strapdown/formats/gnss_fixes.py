@@ -33,45 +33,33 @@ VELOCITY_SDS = "0.05 suits RTK, 0.3 a code receiver by Doppler, 1 one that diffe
 
 @dataclass(frozen=True)
 class GnssOptions:
-    """User's statements about a file of fixes; None means as in the file.
+    """User's statements about a file of fixes; None means as in the file."""
 
-    Attributes
-    ----------
-    format : str, optional
-        A key of `formats.READERS`.
-    columns : dict of str to str
-        Quantity (``time``, ``lat`` …, as in a Gnss table) to the name of its column, or its
-        number, from 1.
-    units : dict of str to str
-        Quantity to the unit of its column: ``time`` in ``ms``, ``lat`` in ``rad``.
-    datum_height : float, optional, m
-        Height over the ellipsoid of the level from which the file counts its heights: that of
-        the geoid, or of the point of take-off.
-    origin : tuple of float, optional, deg, deg, m
-        Latitude, longitude and height of the origin of local positions (``north east up``).
-    position_sd, velocity_sd : float or tuple of float, optional, m and m/s
-        Standard deviations north, east, down, or one for all three, for each fix; they replace
-        those of the file.
-    unstated_position_sd, unstated_velocity_sd : float, optional, m and m/s
-        Used where the file states none; `attrs` of the table then has ``position_sd_taken``,
-        ``velocity_sd_taken``.
-    clock_steps : tuple of pairs of float, s
-        Steps of the receiver's clock, one after another: a stamp, and what is subtracted from it
-        and the later ones.
-    repair : bool
-        Drop and count rows that cannot be used, instead of refusing the file.
-    """
-
+    #: A key of `formats.READERS`.
     format: str | None = None
+    #: Quantity (``time``, ``lat`` …, as in a Gnss table) to the name of its column, or its number,
+    #: from 1.
     columns: Mapping[str, str] = field(default_factory=dict)
+    #: Quantity to the unit of its column: ``time`` in ``ms``, ``lat`` in ``rad``.
     units: Mapping[str, str] = field(default_factory=dict)
+    #: Height over the ellipsoid, m, of the level from which the file counts its heights: that of the
+    #: geoid, or of the point of take-off.
     datum_height: float | None = None
+    #: Latitude and longitude, deg, and height, m, of the origin of local positions (``north east
+    #: up``).
     origin: tuple[float, float, float] | None = None
+    #: `position_sd`, `velocity_sd`: standard deviations north, east, down, or one for all three,
+    #: for each fix; they replace those of the file.
     position_sd: Sd | None = None
     velocity_sd: Sd | None = None
+    #: `unstated_position_sd`, `unstated_velocity_sd`: used where the file states none; `attrs` of
+    #: the table then has ``position_sd_taken``, ``velocity_sd_taken``.
     unstated_position_sd: float | None = None
     unstated_velocity_sd: float | None = None
+    #: Steps of the receiver's clock, s, one after another: a stamp, and what is subtracted from it
+    #: and the later ones.
     clock_steps: tuple[tuple[float, float], ...] = ()
+    #: Drop and count rows that cannot be used, instead of refusing the file.
     repair: bool = False
 
     def __post_init__(self) -> None:
@@ -90,45 +78,30 @@ class GnssOptions:
 
 @dataclass
 class Fixes:
-    """Fixes from a file, in the units of a Gnss table; NaN where missing.
-
-    Attributes
-    ----------
-    name : str
-    time : ndarray, (n,), s
-    place : ndarray, (n, 3)
-        Latitude and longitude in deg, height above the ellipsoid in m.
-    rows : ndarray of int, (n,)
-        Row of the file, counted from 1.
-    clock : Clock
-    velocity, position_sd, velocity_sd : ndarray, (n, 3), or None
-        North, east, down.
-    quality : ndarray, (n,), or None
-        As field 6 of NMEA 0183 GGA.
-    satellites : ndarray, (n,), or None
-        Used in each fix; for display.
-    zero_is_unknown : bool
-        A standard deviation of zero means unknown.
-    heights_from : {'sea', 'take-off', 'unstated', 'nowhere', ''}
-        Level from which heights are counted; empty: from the ellipsoid; 'nowhere': the fixes have
-        none.
-    height_source : str
-        Column or field of the heights, for messages.
-    findings : list of Finding
-    """
+    """Fixes from a file, in the units of a Gnss table; NaN where missing."""
 
     name: str
+    #: (n,), s.
     time: Array
+    #: (n, 3): latitude and longitude in deg, height above the ellipsoid in m.
     place: Array
+    #: (n,): row of the file, counted from 1.
     rows: NDArray[np.int64]
     clock: Clock = field(default_factory=lambda: Clock(RELATIVE))
+    #: `velocity`, `position_sd`, `velocity_sd`: (n, 3): north, east, down.
     velocity: Array | None = None
     position_sd: Array | None = None
     velocity_sd: Array | None = None
+    #: (n,): as field 6 of NMEA 0183 GGA.
     quality: Array | None = None
+    #: (n,): used in each fix; for display.
     satellites: Array | None = None
+    #: A standard deviation of zero means unknown.
     zero_is_unknown: bool = False
+    #: {'sea', 'take-off', 'unstated', 'nowhere', ''}: level from which heights are counted; empty:
+    #: from the ellipsoid; 'nowhere': the fixes have none.
     heights_from: str = ""
+    #: Column or field of the heights, for messages.
     height_source: str = ""
     findings: list[Finding] = field(default_factory=list)
 

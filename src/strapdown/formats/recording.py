@@ -160,70 +160,47 @@ class StatedStart:
 
 @dataclass
 class RawLog:
-    """Raw columns of a file.
+    """Raw columns of a file."""
 
-    Attributes
-    ----------
-    name : str
-        Of the file or folder, for messages.
-    files : tuple of Path
-        Every file that was read.
-    columns : dict of str to ndarray
-        One-dimensional; not numeric where the file holds text.
-    rows : ndarray of int, or None
-        Row of each sample in the file, counted from 1; None if sample k is in row k + 1.
-    stated : dict of str to (str, str or None)
-        For a known recording: column to (quantity, unit); unit None if not stated.
-    other_units : list of dict of str to (str, str or None)
-        The same for each further sensor unit in the file, which is read where one of its columns
-        is asked for.
-    units : dict of str to str
-        Column to unit, if stated apart from the name.
-    triad_units : dict of str to str
-        Unit of ``gyro``, ``accel``, ``mag``, if stated of the sensor and not of a column: as
-        ``deg/s``, or of raw counts as ``deg/s/131``.
-    rate : float or None
-        Sampling rate in Hz, if stated apart from stamps.
-    sampling, axes : str or None
-        If the file states them.
-    truth : TruthInSensorAxes or None
-    findings : list of Finding
-    start : StatedStart or None
-        If the file states one.
-    above : list of str
-        Lines above a text table.
-    clock : str or None
-        Clock of its stamps (`clocks`), if the format defines it.
-    epoch : float, s
-        Seconds on that clock at stamp zero.
-    checked : bool
-        Whether `strapdown doctor` wrote it: its statements were checked against the numbers, or
-        were decided by a person.
-    calibrated : str or None
-        The calibration whose errors were taken off before it was written: name and SHA-256.
-    sparse : frozenset of str
-        Triads of which some samples may be missing, NaN: of a magnetometer that began later.
-    """
-
+    #: Of the file or folder, for messages.
     name: str
+    #: Every file that was read.
     files: tuple[Path, ...]
+    #: One-dimensional; not numeric where the file holds text.
     columns: dict[str, NDArray[Any]]
+    #: Row of each sample in the file, counted from 1; None if sample k is in row k + 1.
     rows: NDArray[np.int64] | None = None
+    #: For a known recording: column to (quantity, unit); unit None if not stated.
     stated: Mapping[str, tuple[str, str | None]] = field(default_factory=dict)
+    #: The same for each further sensor unit in the file, which is read where one of its columns is
+    #: asked for.
     other_units: list[dict[str, tuple[str, str | None]]] = field(default_factory=list)
+    #: Column to unit, if stated apart from the name.
     units: dict[str, str] = field(default_factory=dict)
+    #: Unit of ``gyro``, ``accel``, ``mag``, if stated of the sensor and not of a column: as
+    #: ``deg/s``, or of raw counts as ``deg/s/131``.
     triad_units: dict[str, str] = field(default_factory=dict)
+    #: Sampling rate in Hz, if stated apart from stamps.
     rate: float | None = None
+    #: `sampling`, `axes`: if the file states them.
     sampling: str | None = None
     axes: str | None = None
     truth: TruthInSensorAxes | None = None
     findings: list[Finding] = field(default_factory=list)
+    #: If the file states one.
     start: StatedStart | None = None
+    #: Lines above a text table.
     above: list[str] = field(default_factory=list)
+    #: Clock of its stamps (`clocks`), if the format defines it.
     clock: str | None = None
+    #: Seconds on that clock at stamp zero.
     epoch: float = 0.0
+    #: Whether `strapdown doctor` wrote it: its statements were checked against the numbers, or were
+    #: decided by a person.
     checked: bool = False
+    #: The calibration whose errors were taken off before it was written: name and SHA-256.
     calibrated: str | None = None
+    #: Triads of which some samples may be missing, NaN: of a magnetometer that began later.
     sparse: frozenset[str] = frozenset()
 
     @classmethod
