@@ -42,8 +42,8 @@ class GnssOptions:
     columns: Mapping[str, str] = field(default_factory=dict)
     #: Quantity to the unit of its column: ``time`` in ``ms``, ``lat`` in ``rad``.
     units: Mapping[str, str] = field(default_factory=dict)
-    #: Height over the ellipsoid, m, of the level from which the file counts its heights: that of the
-    #: geoid, or of the point of take-off.
+    #: Height over the ellipsoid, m, of the level from which the file counts its heights: that of
+    #: the geoid, or of the point of take-off.
     datum_height: float | None = None
     #: Latitude and longitude, deg, and height, m, of the origin of local positions (``north east
     #: up``).
