@@ -58,7 +58,8 @@ def is_date(field: object) -> bool:
 
 def is_stamp(field: str) -> bool:
     """Whether a field is a time of day, a date, or both."""
-    return _STAMP.fullmatch(_plain(field)) is not None or is_date(field)
+    plain = _plain(field)
+    return _STAMP.fullmatch(plain) is not None or _ONLY_DATE.fullmatch(plain) is not None
 
 
 def _plain(field: str) -> str:

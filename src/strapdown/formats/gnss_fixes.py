@@ -189,19 +189,15 @@ def _over_ellipsoid(fixes: Fixes, options: GnssOptions) -> Array:
             **(proposed if fixes.heights_from != "take-off" else {}),
         )
     if fixes.heights_from != NOWHERE:
-        fixes.findings.append(_said_of_datum(fixes, options.datum_height))
+        add_note(
+            fixes.findings,
+            "io.heights-with-datum" if options.datum_height else "io.heights-stay-over-datum",
+            file=fixes.name,
+            quantity="alt",
+            source=fixes.height_source,
+            datum_height=options.datum_height,
+        )
     return np.asarray(fixes.place + np.array([0.0, 0.0, options.datum_height]))
-
-
-def _said_of_datum(fixes: Fixes, height: float) -> Finding:
-    return Finding(
-        "io.heights-with-datum" if height else "io.heights-stay-over-datum",
-        severity="note",
-        file=fixes.name,
-        quantity="alt",
-        source=fixes.height_source,
-        datum_height=height,
-    )
 
 
 def _sd_of_stated_height(fixes: Fixes, asked: Sd | None, options: GnssOptions, count: int) -> float:
