@@ -561,12 +561,8 @@ def recording_of(raw: RawLog, asked: ReadOptions, *, keep: bool = True) -> Recor
         _refuse_other_table(raw)
     if raw.calibrated is not None and asked.calibration is not None:
         given = Path(str(asked.calibration)).name
-        raise DataError(
-            "calibrate.calibrated-twice",
-            file=raw.name,
-            quantity="calibration",
-            by=raw.calibrated,
-            calibration=given,
+        raise raw.fault(
+            "calibrate.calibrated-twice", "calibration", by=raw.calibrated, calibration=given
         )
     recording = assemble(raw, asked, keep=keep)
     return recording if asked.calibration is None else _calibrated(recording, asked)
@@ -645,4 +641,4 @@ def _refuse_other_table(raw: RawLog) -> None:
         code = "io.table-of-attitudes"
     else:
         return
-    raise DataError(code, file=raw.name, columns=list(raw.columns), name=raw.name)
+    raise raw.fault(code, columns=list(raw.columns), name=raw.name)

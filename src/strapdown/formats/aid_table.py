@@ -105,9 +105,8 @@ def read_aid_table(
     missing = [q for q in ("time", *columns) if q not in found and q not in optional]
     if missing:
         needed = [q for q in ("time", *columns) if q not in optional]
-        raise DataError(
+        raise raw.fault(
             "io.missing-columns",
-            file=raw.name,
             missing=missing,
             columns=list(raw.columns),
             needed=needed,
@@ -302,7 +301,7 @@ def _usable(
     _refuse_or_say(raw, "time", late, "io.aid-not-later", repair, findings)
     keep &= ~late
     if not keep.any():
-        raise DataError("io.no-usable-row", file=raw.name)
+        raise raw.fault("io.no-usable-row")
     return keep
 
 

@@ -349,11 +349,10 @@ def numbers(raw: RawLog, source: str, quantity: str) -> NDArray[Any]:
     found = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=np.float64)
     bad = np.flatnonzero(np.isnan(found) & texts.notna().to_numpy())
     if bad.size:
-        raise DataError(
+        raise raw.fault(
             "io.value-not-a-number",
-            file=raw.name,
-            row=raw.row(int(bad[0])),
-            quantity=quantity,
+            quantity,
+            sample=int(bad[0]),
             values=values[bad[0]],
             source=source,
         )
@@ -404,13 +403,8 @@ def ticks_of(raw: RawLog, source: str, unit: str | None = None) -> tuple[NDArray
     found = nanoseconds_of(values)
     if found is None:
         first = next((k for k, v in enumerate(values) if nanoseconds_of([v]) is None), 0)
-        raise DataError(
-            "io.not-date-time-like-those",
-            file=raw.name,
-            row=raw.row(first),
-            quantity="time",
-            values=values[first],
-            source=source,
+        raise raw.fault(
+            "io.not-date-time-like-those", "time", sample=first, values=values[first], source=source
         )
     return found, True
 

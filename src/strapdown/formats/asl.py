@@ -131,7 +131,7 @@ def _stated(raw: RawLog, known: dict[str, str]) -> RawLog:
     missing = {"time", *known.values()} - {quantity for quantity, _ in stated.values()}
     if missing:
         names = ", ".join(raw.columns)
-        raise DataError("io.no-column-4", file=raw.name, missing=sorted(missing), columns=names)
+        raise raw.fault("io.no-column-4", missing=sorted(missing), columns=names)
     return dataclasses.replace(raw, stated=stated)
 
 

@@ -151,15 +151,14 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         kept = stored(np.flatnonzero(finite)[stamps.keep])
         time = stored(stamps.seconds, np.flatnonzero(stamps.keep))
     if time.size < 2:
-        raise DataError("io.too-few-samples", file=raw.name, quantity="time", size=time.size)
+        raise raw.fault("io.too-few-samples", "time", size=time.size)
     # A median of steps is at most twice their mean.
     faster = 2.0 * (time[-1] - time[0]) <= SLOWEST * (time.size - 1)
     slow = 0.0 if faster else float(np.median(np.diff(time)))
     if slow > SLOWEST and options.time_unit is None and options.rate is None:
-        raise DataError(
+        raise raw.fault(
             "io.too-slow-for-a-gyro",
-            file=raw.name,
-            quantity="time",
+            "time",
             size=time.size,
             length=time[-1] - time[0],
             step=slow,
@@ -502,7 +501,7 @@ def _stamps_of_log(
     if ticks is None:
         assert rows is not None
         if rate is None:
-            raise DataError("io.time-column-missing", file=raw.name, quantity="time")
+            raise raw.fault("io.time-column-missing", "time")
         if numbered := counted(raw.columns):
             name, count = numbered
             lost = int(count[-1]) + 1 - count.size
@@ -682,11 +681,10 @@ def _finite_rows(log: LogInUse, ticks: NDArray[Any] | None) -> NDArray[np.bool_]
         quantity = name if name == "time" else f"{name}_{AXES[column]}"
         count = int(bad.any(axis=1).sum())
         if not log.options.repair:
-            raise DataError(
+            raise raw.fault(
                 "io.not-finite-in-rows",
-                file=raw.name,
-                row=raw.row(row),
-                quantity=quantity,
+                quantity,
+                sample=row,
                 block=block[row, column],
                 source=log.found[quantity].source,
                 count=count,
@@ -694,7 +692,7 @@ def _finite_rows(log: LogInUse, ticks: NDArray[Any] | None) -> NDArray[np.bool_]
         log.note("io.rows-without-number-left-out", quantity, row=raw.row(row), count=count)
         keep &= ~bad.any(axis=1)
     if not keep.any():
-        raise DataError("io.no-usable-row", file=raw.name)
+        raise raw.fault("io.no-usable-row")
     return keep
 
 
@@ -824,7 +822,7 @@ def _quaternions(raw: RawLog, found: dict[str, Column]) -> tuple[Array | None, l
     if units == {"rad"}:
         angles = np.degrees(angles)
     elif units != {"deg"}:
-        raise DataError("io.unit-angles-not-stated", file=raw.name, quantity=", ".join(EULERS))
+        raise raw.fault("io.unit-angles-not-stated", ", ".join(EULERS))
     finite = np.isfinite(angles).all(axis=1)
     q = np.full((len(angles), 4), np.nan)
     q[finite] = rotation.quaternion_from_euler(angles[finite])

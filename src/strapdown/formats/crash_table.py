@@ -97,7 +97,7 @@ def record_of(
         shown = ", ".join(clean(t, 40) for t in texts[:6]) + (" …" if len(texts) > 6 else "")
         add_note(findings, "io.columns-text-left-out", file=raw.name, value_shown=shown)
     if not kept:
-        raise DataError("io.no-numeric-column", file=raw.name)
+        raise raw.fault("io.no-numeric-column")
     notes = notes or {}
     names = unique(
         [
@@ -317,7 +317,7 @@ def _stamps(raw: RawLog, clock: str, stated: str) -> Callable[[], Array]:
             if raw.rate:
                 count = len(next(iter(raw.columns.values())))
                 return np.arange(count, dtype=np.float64) / raw.rate
-            raise DataError("io.crash-time-column-missing", file=raw.name, quantity="time")
+            raise raw.fault("io.crash-time-column-missing", "time")
         stamps, dated = _ticks(raw, clock)
         unit = "ns" if dated else stated
         return seconds_of(Clock(clock, stamps, unit, raw.name, raw.row))[0]

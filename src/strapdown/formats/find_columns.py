@@ -130,9 +130,8 @@ def require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
     if _is_nameless(raw):
         raise DataError(_nameless(raw, {}))
     left_out = [f for f in raw.findings if f.code.startswith("io.left-out")]
-    raise DataError(
+    raise raw.fault(
         "io.no-gyro-columns-left-out" if left_out else "io.no-gyro-columns",
-        file=raw.name,
         missing=missing,
         columns=list(raw.columns) or ["none"],
         left_out=left_out,

@@ -61,12 +61,8 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         there = [name for name in names if name in found]
         if there and len(there) < len(names):
             missing = next(name for name in names if name not in found)
-            raise DataError(
-                "io.missing-while-column",
-                file=raw.name,
-                quantity=missing,
-                there=there[0],
-                source=found[there[0]].source,
+            raise raw.fault(
+                "io.missing-while-column", missing, there=there[0], source=found[there[0]].source
             )
         return np.column_stack([values(name) for name in names]) if there else None
 
@@ -138,29 +134,20 @@ def _refuse_missing(raw: RawLog, found: dict[str, Found], *, stated: bool) -> No
             far = np.nanmedian(np.linalg.norm(np.asarray(xyz, dtype=np.float64), axis=1))
             if _NEAR_EARTH[0] < far < _NEAR_EARTH[1]:
                 columns = f"ecef_x={x},ecef_y={y},ecef_z={z}"
-                raise DataError(
+                raise raw.fault(
                     "io.positions-likely-ecef",
-                    file=raw.name,
-                    quantity=", ".join(axes),
+                    ", ".join(axes),
                     distance=far,
                     flags=f"--gnss-columns {shlex.quote(columns)}",
                     keys=f'columns = {{ecef_x = "{x}", ecef_y = "{y}", ecef_z = "{z}"}}',
                 )
-            raise DataError(
-                "io.positions-without-origin",
-                file=raw.name,
-                quantity=", ".join(axes),
-                x=x,
-                y=y,
-                z=z,
-            )
+            raise raw.fault("io.positions-without-origin", ", ".join(axes), x=x, y=y, z=z)
         missing += [q for q in _GEODETIC if q not in found]
     if set(_GEODETIC) <= found.keys() and not set(_HEIGHTS) & found.keys() and not stated:
         missing.append("alt")
     if missing:
-        raise DataError(
+        raise raw.fault(
             "io.fixes-without-height" if missing == ["alt"] else "io.missing-columns-2",
-            file=raw.name,
             missing=missing,
             columns=list(raw.columns),
             missing_2=missing[0],
@@ -196,18 +183,12 @@ def _place(
     if not local:
         return geodetic_from_ecef(np.column_stack([values(q) for q in _ECEF])), "alt"
     if options.origin is None:
-        raise DataError(
-            "io.local-positions-origin-open",
-            file=raw.name,
-            quantity=", ".join(found[q].source for q in _LOCAL),
+        raise raw.fault(
+            "io.local-positions-origin-open", ", ".join(found[q].source for q in _LOCAL)
         )
     if "up" not in found:
-        raise DataError(
-            "io.missing-columns-2",
-            file=raw.name,
-            missing=["up"],
-            columns=list(raw.columns),
-            missing_2="up",
+        raise raw.fault(
+            "io.missing-columns-2", missing=["up"], columns=list(raw.columns), missing_2="up"
         )
     ned = np.column_stack([values("north"), values("east"), -values("up")])
     return geodetic_from_ned(ned, options.origin), "alt"
@@ -342,10 +323,9 @@ def _refuse_unit_of_speed(
     if unit is None or 2.0 * sd > _NEAR * ratio:
         return
     answer = dict.fromkeys(names, unit)
-    raise DataError(
+    raise raw.fault(
         "io.speed-unit-not-stated",
-        file=raw.name,
-        quantity=", ".join(names),
+        ", ".join(names),
         source=found[names[0]].source,
         ratio=1.0 / ratio,
         unit=unit,
@@ -414,11 +394,10 @@ def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
                 step=step * TIME_UNITS[unit],
             )
             return time * TIME_UNITS[unit], Clock(name)
-        raise DataError(
+        raise raw.fault(
             "io.stamp-no-date-clock-tells",
-            file=raw.name,
-            row=raw.row(0),
-            quantity="time",
+            "time",
+            sample=0,
             first=first,
             source=found.source,
             flags=f"--gnss-units time={unit}",
@@ -436,9 +415,7 @@ def _quality(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array
     known = np.isin(codes, list(QUALITY))
     if not known.all():
         k = int(np.argmin(known))
-        raise DataError(
-            "io.solution-kind-unknown", file=raw.name, row=raw.row(k), quantity="Q", codes=codes[k]
-        )
+        raise raw.fault("io.solution-kind-unknown", "Q", sample=k, codes=codes[k])
     add_note(
         raw.findings,
         "io.column-taken-codes-rtklib-fix",

@@ -243,7 +243,7 @@ def _time(raw: RawLog) -> tuple[dict[str, tuple[NDArray[Any], str | None]], str]
         return {"time": (np.asarray(tow + WEEK * (week - week[0])), "s")}, GPS
     if "Time" in raw.columns:
         return {"time": (raw.columns["Time"], None)}, UNIX
-    raise DataError("io.microstrain-without-stamps", file=raw.name, quantity="time")
+    raise raw.fault("io.microstrain-without-stamps", "time")
 
 
 # x-IMU3 of x-io Technologies: CSV of its software, a folder of tables or one of them.
@@ -475,10 +475,9 @@ def _tick(raw: RawLog, ticks: NDArray[Any], rate: float | None) -> int:
         fits = [t for t, r in found.items() if RATES[0] <= r <= RATES[1]]
     if len(fits) == 1:
         return fits[0]
-    raise DataError(
+    raise raw.fault(
         "io.xsens-tick-undecided" if rate is None else "io.xsens-tick-against-rate",
-        file=raw.name,
-        quantity=STAMP,
+        STAMP,
         step=step,
         rate_hz=rate,
         choices=[

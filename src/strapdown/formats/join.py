@@ -125,12 +125,7 @@ def clock_of(log: RawLog, found: dict[str, Column]) -> OwnClock:
     DataError: the log has no stamps, or they are not numbers.
     """
     if "time" not in found:
-        raise DataError(
-            "io.join-time-column-missing",
-            file=log.name,
-            quantity="time",
-            columns=list(log.columns),
-        )
+        raise log.fault("io.join-time-column-missing", "time", columns=list(log.columns))
     ticks, dated = ticks_of(log, found["time"].source, found["time"].unit)
     return OwnClock(ticks, "ns" if dated else found["time"].unit)
 
@@ -213,10 +208,9 @@ def _onto(
     out, inside, distance = at_stamps(time, stamps, values)
     if not inside.any():
         start = np.nanmin(time)
-        raise DataError(
+        raise log.fault(
             "io.stamps-run-after-first-gyro",
-            file=log.name,
-            quantity="time",
+            "time",
             stamps=(stamps[0] - start) * factor,
             stamps_2=(stamps[-1] - start) * factor,
             nanmax=(np.nanmax(time) - start) * factor,

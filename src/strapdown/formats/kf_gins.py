@@ -98,13 +98,7 @@ def read(path: Path) -> RawLog:
     raw = csv.read(path)
     names = list(raw.columns)
     if len(names) != len(COLUMNS) or any(n.startswith("column ") is False for n in names):
-        raise DataError(
-            "io.kf-gins-column-count",
-            file=raw.name,
-            row=raw.row(0),
-            count=len(names),
-            names=names[:8],
-        )
+        raise raw.fault("io.kf-gins-column-count", sample=0, count=len(names), names=names[:8])
     columns = dict(zip(COLUMNS, raw.columns.values(), strict=True))
     axes = raw.axes
     if all(c.dtype.kind in "iuf" for c in columns.values()):
@@ -177,12 +171,7 @@ def read_fixes(path: Path) -> Fixes:
     raw = csv.read(path)
     names = WITH_VELOCITY if len(raw.columns) == len(WITH_VELOCITY) else NAMES
     if len(raw.columns) != len(names):
-        raise DataError(
-            "io.kf-gins-fix-column-count",
-            file=raw.name,
-            row=raw.row(0),
-            count=len(raw.columns),
-        )
+        raise raw.fault("io.kf-gins-fix-column-count", sample=0, count=len(raw.columns))
     return fixes_of(raw, names)
 
 
@@ -277,12 +266,8 @@ def read_trajectory(path: Path) -> pd.DataFrame:
     """
     raw = csv.read(path)
     if len(raw.columns) != len(TRAJECTORY_NAMES):
-        raise DataError(
-            "io.nav-column-count",
-            file=raw.name,
-            row=raw.row(0),
-            count=len(raw.columns),
-            count_2=len(TRAJECTORY_NAMES),
+        raise raw.fault(
+            "io.nav-column-count", sample=0, count=len(raw.columns), count_2=len(TRAJECTORY_NAMES)
         )
     named = zip(TRAJECTORY_NAMES, raw.columns, strict=True)
     values = {n: np.asarray(numbers(raw, c, n), dtype=np.float64) for n, c in named}

@@ -53,9 +53,7 @@ def column(raw: RawLog, name: str) -> NDArray[Any]:
     DataError: it is missing, or a value is not a number.
     """
     if name not in raw.columns:
-        raise DataError(
-            "io.no-column-4", file=raw.name, missing=[name], columns=", ".join(raw.columns)
-        )
+        raise raw.fault("io.no-column-4", missing=[name], columns=", ".join(raw.columns))
     return numbers(raw, name, name)
 
 

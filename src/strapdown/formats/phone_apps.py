@@ -173,13 +173,8 @@ def _time(raw: RawLog) -> NDArray[np.float64]:
                 3600 * hours + 60 * minutes + seconds + float(f"0.{parts[3]}" if parts[3:] else 0)
             )
         except ValueError:
-            raise DataError(
-                "io.value-not-a-number",
-                file=raw.name,
-                row=raw.row(k),
-                quantity="time",
-                values=text,
-                source="time",
+            raise raw.fault(
+                "io.value-not-a-number", "time", sample=k, values=text, source="time"
             ) from None
     return np.asarray(out + 86400.0 * np.cumsum(np.diff(out, prepend=out[0]) < -43200.0))
 

@@ -221,6 +221,13 @@ class RawLog:
             **stated,
         )
 
+    def fault(
+        self, code: str, quantity: str | None = None, *, sample: int | None = None, **data: Any
+    ) -> DataError:
+        """Make an error of the file, or of one of its samples."""
+        row = None if sample is None else self.row(sample)
+        return DataError(code, file=self.name, row=row, quantity=quantity, **data)
+
     def row(self, sample: int) -> int:
         """Row of a sample in the file, counted from 1."""
         return sample + 1 if self.rows is None else int(self.rows[sample])

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding, add_note
+from strapdown.errors import Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import RELATIVE, UNIX
@@ -170,13 +170,7 @@ def _clock(raw: RawLog, kind: str) -> str:
     for name in (STAMPS[kind], STAMPS[MOTION], STAMPS[GYRO], WALL_CLOCK):
         if name in raw.columns:
             return name
-    raise DataError(
-        "io.no-column-5",
-        file=raw.name,
-        quantity="time",
-        stamps=STAMPS[kind],
-        columns=list(raw.columns),
-    )
+    raise raw.fault("io.no-column-5", "time", stamps=STAMPS[kind], columns=list(raw.columns))
 
 
 def _changes(stamps: NDArray[Any]) -> NDArray[np.bool_]:

@@ -174,13 +174,7 @@ def _columns(
         held[NED.get(quantity, quantity)] = (np.asarray(column(raw, name)), unit)
     size = next(iter(held.values()))[0].size
     if count is not None and size != count:
-        raise DataError(
-            "io.rows-not-those-of-stamps",
-            file=raw.name,
-            row=raw.row(size - 1),
-            size=size,
-            count=count,
-        )
+        raise raw.fault("io.rows-not-those-of-stamps", sample=size - 1, size=size, count=count)
     return held
 
 

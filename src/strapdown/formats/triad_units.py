@@ -184,16 +184,14 @@ def _refuse_open(log: LogInUse, triad: str) -> None:
     # A clock may be local, too, so that this is a unit of nothing else.
     local = re.search(r"\blocal\b", f"{column.source} {raw.units.get(column.source)}")
     if unit in RELATIVE_FIELDS or (triad == "mag" and unit is None and local):
-        raise DataError("io.mag-unit-relative", file=raw.name, quantity=triad, source=column.source)
+        raise raw.fault("io.mag-unit-relative", triad, source=column.source)
     apple = any(re.sub(r"\W", "", name).lower() in APPLE for name in raw.columns)
     if triad == "accel" and unit is None and apple:
         unit = "-g or g"  # that of CoreMotion, or turned by the application
     if unit is None and read_name(column.source).increment:
         unit = OPEN[triad]
     if unit and " or " in unit:
-        raise DataError(
-            "io.file-leaves-open-whether", file=raw.name, quantity=triad, unit=unit, triad=triad
-        )
+        raise raw.fault("io.file-leaves-open-whether", triad, unit=unit, triad=triad)
 
 
 def _report_overruled(log: LogInUse, triad: str, likely: Inference | None) -> None:
