@@ -22,13 +22,7 @@ from strapdown.systems.alignment_run import AlignmentRun, run_alignment
 from strapdown.systems.inputs import NOWHERE, Memory
 from strapdown.systems.outage_run import OutageRun, run_outage
 
-__all__ = [
-    "AlignmentRun",
-    "OutageRun",
-    "align",
-    "outage",
-    "specify_alignment",
-]
+__all__ = ["AlignmentRun", "OutageRun", "align", "outage", "specify_alignment"]
 
 
 def align(

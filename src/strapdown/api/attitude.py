@@ -525,9 +525,7 @@ class OrientationFilter:
             force = self._force + _three(accel, "accel")
             roll, pitch = rotation.level(force / (self._samples + 1))
             tracker = AttitudeTracker(
-                self._algorithm,
-                rotation.quaternion_from_euler([roll, pitch, 0.0]),
-                self._sampling,
+                self._algorithm, rotation.quaternion_from_euler([roll, pitch, 0.0]), self._sampling
             )
             tracker.update(time, rate)
             self._force, self._tracker = force, tracker

@@ -10,14 +10,7 @@ from typing import Any
 import pandas as pd
 
 from strapdown.api.navigation import specify_navigation
-from strapdown.api.reading import (
-    ImuFile,
-    imu_input,
-    imu_of,
-    keys_in,
-    log_table,
-    table_input,
-)
+from strapdown.api.reading import ImuFile, imu_input, imu_of, keys_in, log_table, table_input
 from strapdown.api.stamps import by_time
 from strapdown.config.extrinsics import ExtrinsicsSpec
 from strapdown.config.logs import LogTable

@@ -553,11 +553,7 @@ def _imu_of(source: pd.DataFrame) -> pd.DataFrame:
 
 
 def imu_of_arrays(
-    t: Any,
-    gyro: Any,
-    accel: Any = None,
-    sampling: str = "instantaneous",
-    source: str | None = None,
+    t: Any, gyro: Any, accel: Any = None, sampling: str = "instantaneous", source: str | None = None
 ) -> pd.DataFrame:
     """An Imu table from arrays, stored column by column like one that is read."""
     stamps, clock = seconds_of(t)

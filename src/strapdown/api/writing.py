@@ -146,10 +146,7 @@ def read_streams(
                     raise
                 else:
                     out = Finding(
-                        "api.stream-left-out",
-                        file=path.name,
-                        quantity=stream,
-                        reason=error.finding,
+                        "api.stream-left-out", file=path.name, quantity=stream, reason=error.finding
                     )
                     findings.append(out)
                 continue

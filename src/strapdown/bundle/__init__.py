@@ -261,10 +261,7 @@ def write_bundle(
         digests.append(sha256(folder / MANIFEST))
 
     digests: list[str] = []
-    with (
-        claimed(out, force) as folder,
-        atomic_folder.written_whole(folder, seal) as staging,
-    ):
+    with claimed(out, force) as folder, atomic_folder.written_whole(folder, seal) as staging:
         yield staging
     seals.append(Seal(out.absolute(), *digests))
 
@@ -354,17 +351,7 @@ def _keep(
 # Dependencies of the results besides the inputs: packages and the platform.
 
 
-PACKAGES = (
-    "strapdown",
-    "numpy",
-    "scipy",
-    "numba",
-    "pandas",
-    "pyarrow",
-    "h5py",
-    "jinja2",
-    "typst",
-)
+PACKAGES = ("strapdown", "numpy", "scipy", "numba", "pandas", "pyarrow", "h5py", "jinja2", "typst")
 
 
 def versions() -> dict[str, str]:

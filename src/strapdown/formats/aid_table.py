@@ -306,12 +306,7 @@ def _usable(
 
 
 def _refuse_or_say(
-    raw: RawLog,
-    name: str,
-    bad: NDArray[np.bool_],
-    code: str,
-    repair: bool,
-    findings: list[Finding],
+    raw: RawLog, name: str, bad: NDArray[np.bool_], code: str, repair: bool, findings: list[Finding]
 ) -> None:
     rows = np.flatnonzero(bad)
     if not rows.size:

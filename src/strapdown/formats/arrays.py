@@ -223,10 +223,7 @@ RATES = ("sampling_rate", "sample_rate", "rate_hz", "fs", "freq", "frequency")
 
 
 def raw_log(
-    path: Path,
-    arrays: dict[str, NDArray[Any]],
-    units: dict[str, str],
-    meta: dict[str, Any],
+    path: Path, arrays: dict[str, NDArray[Any]], units: dict[str, str], meta: dict[str, Any]
 ) -> RawLog:
     """Convert named arrays to columns of one length.
 

@@ -25,12 +25,7 @@ from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.columns import read_name
 from strapdown.formats.inference.conclusion import differenced
-from strapdown.formats.recording import (
-    RawLog,
-    TruthInSensorAxes,
-    calibrated_in,
-    calibrated_mark,
-)
+from strapdown.formats.recording import RawLog, TruthInSensorAxes, calibrated_in, calibrated_mark
 from strapdown.formats.sensor_folder import file_member, first_line
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.formats.tum import poses
@@ -245,10 +240,7 @@ def _with(raw: RawLog, q_ns: Array, known: RawLog) -> RawLog:
         tilt=tilt,
     )
     return dataclasses.replace(
-        raw,
-        truth=TruthInSensorAxes(q_ns, at),
-        files=(*raw.files, *known.files),
-        findings=findings,
+        raw, truth=TruthInSensorAxes(q_ns, at), files=(*raw.files, *known.files), findings=findings
     )
 
 

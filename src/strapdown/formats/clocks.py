@@ -255,13 +255,7 @@ def on_clock_of(
     out.attrs = {**table.attrs, "clock": other.name, "clock_origin": other.origin}
     out.attrs["clock_origin_stamp"] = imu.attrs.get("clock_origin_stamp")
     out.attrs["gps_week"] = other.week
-    return out, Finding(
-        code,
-        file=file,
-        quantity="time",
-        severity="note",
-        shift=shift,
-    )
+    return out, Finding(code, file=file, quantity="time", severity="note", shift=shift)
 
 
 # Samples that are numbered.

@@ -22,13 +22,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
-from strapdown.formats.crash_record import (
-    LONGEST_NAME,
-    CrashChannel,
-    CrashRecord,
-    clean,
-    unique,
-)
+from strapdown.formats.crash_record import LONGEST_NAME, CrashChannel, CrashRecord, clean, unique
 from strapdown.formats.crash_samples import Clock, seconds_of
 from strapdown.formats.crash_table import MOST_REMARKS, NOTE, ChannelName, channel_name
 from strapdown.units import FACTORS, OF_CRASHES, SPEEDS, TIME_UNITS, find_unit, unit_words

@@ -227,10 +227,7 @@ def header_of(path: Path, suffix: str, several: str, none: str) -> Path:
     if len(headers) != 1:
         held = ", ".join(clean(p.name, LONGEST_NAME) for p in headers[:6])
         raise DataError(
-            several if headers else none,
-            file=path.resolve().name,
-            count=len(headers),
-            held=held,
+            several if headers else none, file=path.resolve().name, count=len(headers), held=held
         )
     return headers[0]
 

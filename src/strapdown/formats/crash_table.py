@@ -232,12 +232,7 @@ def _advances(values: NDArray[Any]) -> bool:
 
 
 def _channel(
-    raw: RawLog,
-    source: str,
-    name: str,
-    names: dict[str, ChannelName],
-    clock: str,
-    clock_name: str,
+    raw: RawLog, source: str, name: str, names: dict[str, ChannelName], clock: str, clock_name: str
 ) -> CrashChannel:
     said = names[source]
     if _begins_from_rest(raw, source, said, clock):
@@ -335,9 +330,7 @@ LARGEST = 2_000_000_000
 _TITLE = "# title: "
 
 
-def read_text_table(
-    path: Path,
-) -> tuple[RawLog, dict[str, dict[str, Any]], str, tuple[str, ...]]:
+def read_text_table(path: Path) -> tuple[RawLog, dict[str, dict[str, Any]], str, tuple[str, ...]]:
     """Read a text table whose header may be below the first line.
 
     Returns : `units` are those of the row of units, if there is one; : metadata of columns from

@@ -12,12 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.clocks import EPOCH
-from strapdown.formats.crash_record import (
-    QUANTITIES,
-    CrashChannel,
-    CrashRecord,
-    refuse_impossible,
-)
+from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord, refuse_impossible
 from strapdown.formats.crash_samples import Clock, last_midnight, past_midnight, seconds_of
 from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.triad_units import what_numbers_say
@@ -555,9 +550,7 @@ def _evident(
         if unit is not None and unit.settled and (form is None or form.value == "rate"):
             findings.append(
                 unit.finding(
-                    "io.crash-unit-inferred",
-                    file=record.path.name,
-                    quantity=f"unit of {names}",
+                    "io.crash-unit-inferred", file=record.path.name, quantity=f"unit of {names}"
                 )
             )
             return str(unit.value)

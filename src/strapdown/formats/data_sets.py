@@ -289,11 +289,7 @@ def _arrays(path: Path, *names: str) -> dict[str, Any]:
     for name in names:
         if name not in arrays:
             raise DataError(
-                "io.no-such-array",
-                file=path.name,
-                quantity=name,
-                name=name,
-                arrays=list(arrays),
+                "io.no-such-array", file=path.name, quantity=name, name=name, arrays=list(arrays)
             )
     return {name: arrays[name].astype(np.float64) for name in names}
 

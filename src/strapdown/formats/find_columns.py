@@ -84,10 +84,7 @@ def find_columns(
         for q, name in _asked(raw, quantity, source):
             if name in wanted.values():
                 raise ConfigError(
-                    "io.column-named-twice",
-                    file=raw.name,
-                    quantity=f"--columns {q}",
-                    name=name,
+                    "io.column-named-twice", file=raw.name, quantity=f"--columns {q}", name=name
                 )
             wanted[q] = name
             inferred |= {q} if quantity in options.inferred else set()

@@ -17,16 +17,8 @@ from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock
 from strapdown.formats.find_columns import Found, fix_columns, names_of_quantities
-from strapdown.formats.gnss_fixes import (
-    NOWHERE,
-    RADIUS,
-    UNSTATED_VERTICAL,
-    Fixes,
-    table_of_fixes,
-)
-from strapdown.formats.gnss_fixes import (
-    GnssOptions as GnssOptions,
-)
+from strapdown.formats.gnss_fixes import NOWHERE, RADIUS, UNSTATED_VERTICAL, Fixes, table_of_fixes
+from strapdown.formats.gnss_fixes import GnssOptions as GnssOptions
 from strapdown.formats.gnss_pos import QUALITY
 from strapdown.formats.recording import RawLog
 from strapdown.formats.trajectory_readers import EARTH

@@ -63,12 +63,7 @@ class GnssOptions:
     repair: bool = False
 
     def __post_init__(self) -> None:
-        for name in (
-            "position_sd",
-            "velocity_sd",
-            "unstated_position_sd",
-            "unstated_velocity_sd",
-        ):
+        for name in ("position_sd", "velocity_sd", "unstated_position_sd", "unstated_velocity_sd"):
             value = getattr(self, name)
             if value is not None and not (
                 np.shape(value) in ((), (3,)) and np.all(np.asarray(value) > 0.0)

@@ -287,10 +287,7 @@ def _of_one_provider(
     chosen = next((p for p in PROVIDERS if (said == p).any()), None)
     if chosen is None:
         raise DataError(
-            "io.no-gnss-fix",
-            file=path.name,
-            quantity="Provider",
-            said=sorted(set(said)),
+            "io.no-gnss-fix", file=path.name, quantity="Provider", said=sorted(set(said))
         )
     keep: NDArray[np.bool_] = np.asarray(said == chosen)
     if not keep.all():

@@ -80,8 +80,7 @@ def _has_telemetry(path: Path) -> bool:
 
 # Text in UTF-16 too.
 detect = Signs(
-    first=rb"\A(?:DEVC|.{4}ftyp|(?:\xef\xbb\xbf)?\s*\{|\xff\xfe|\xfe\xff)",
-    also=_has_telemetry,
+    first=rb"\A(?:DEVC|.{4}ftyp|(?:\xef\xbb\xbf)?\s*\{|\xff\xfe|\xfe\xff)", also=_has_telemetry
 )
 
 

@@ -267,9 +267,7 @@ def _are_rotations(values: Array) -> NDArray[np.bool_]:
 
 
 detect_odometry = Signs(
-    suffixes=csv.SUFFIXES,
-    text=r"^[ \t]*(?:[^\s,#]+[ \t]+){11}[^\s,#]+[ \t\r]*$",
-    also=_has_poses,
+    suffixes=csv.SUFFIXES, text=r"^[ \t]*(?:[^\s,#]+[ \t]+){11}[^\s,#]+[ \t\r]*$", also=_has_poses
 )
 
 

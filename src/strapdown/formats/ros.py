@@ -28,12 +28,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.known_formats import Quantities, solution
-from strapdown.formats.recording import (
-    NoStreamError,
-    RawLog,
-    calibrated_in,
-    calibrated_mark,
-)
+from strapdown.formats.recording import NoStreamError, RawLog, calibrated_in, calibrated_mark
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.formats.writing import (
     FLU,

@@ -477,11 +477,7 @@ def _wkb(points: NDArray[np.float64]) -> Any:
 
 
 def _geo(points: NDArray[np.float64]) -> dict[str, Any]:
-    column: dict[str, Any] = {
-        "encoding": "WKB",
-        "geometry_types": ["Point Z"],
-        "crs": EPSG_4979,
-    }
+    column: dict[str, Any] = {"encoding": "WKB", "geometry_types": ["Point Z"], "crs": EPSG_4979}
     low, high = points.min(axis=0), points.max(axis=0)
     # A box across the date line has its west beyond its east (RFC 7946, 5.2): it is left out.
     if high[0] - low[0] <= 180.0:

@@ -103,11 +103,7 @@ def write_csv(path: Path, trajectory: pd.DataFrame, options: FileOptions | None 
         return
     head = "".join(f"# {key}: {value}\n" for key, value in comments.items())
     write_decimals(
-        path,
-        list(columns.values()),
-        DECIMALS,
-        separator=",",
-        head=f"{head}{','.join(columns)}\n",
+        path, list(columns.values()), DECIMALS, separator=",", head=f"{head}{','.join(columns)}\n"
     )
 
 

@@ -107,11 +107,7 @@ def _reversed(up: Inference) -> Inference:
 
 
 #: Questions about an accelerometer that its numbers do not answer.
-_OPEN = {
-    "io.counts-unit-not-stated",
-    "io.counts-unit-undecided",
-    "io.file-leaves-open-whether",
-}
+_OPEN = {"io.counts-unit-not-stated", "io.counts-unit-undecided", "io.file-leaves-open-whether"}
 
 
 def units_of_triads(log: LogInUse) -> dict[str, tuple[str, str]]:

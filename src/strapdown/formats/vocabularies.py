@@ -11,15 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from strapdown.units import (
-    ANGLES,
-    LENGTHS,
-    OF_CRASHES,
-    OF_LOGS,
-    OF_TABLES,
-    SPEEDS,
-    TIME_UNITS,
-)
+from strapdown.units import ANGLES, LENGTHS, OF_CRASHES, OF_LOGS, OF_TABLES, SPEEDS, TIME_UNITS
 
 
 @dataclass(frozen=True)

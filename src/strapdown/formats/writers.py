@@ -43,9 +43,7 @@ from strapdown.formats.trajectory_writers import (
     write_kml,
     write_parquet,
 )
-from strapdown.formats.writing import (
-    FileOptions as FileOptions,
-)
+from strapdown.formats.writing import FileOptions as FileOptions
 from strapdown.formats.writing import (
     Tables,
     decimal_seconds,

@@ -399,11 +399,7 @@ def iso_dates(ns: Stamps) -> list[str]:
 
 
 def write_numbers(
-    path: Path,
-    columns: Sequence[NDArray[Any]],
-    head: str = "",
-    *,
-    separator: str = ",",
+    path: Path, columns: Sequence[NDArray[Any]], head: str = "", *, separator: str = ","
 ) -> None:
     """Write columns of numbers as lines, each with the fewest digits that reproduce it.
 

@@ -280,9 +280,7 @@ def _written_step(gyro: Array) -> tuple[float, float]:
 
 
 def _evidence(
-    largest: float,
-    scales: list[tuple[Turn, float]],
-    total: dict[Hypothesis, float],
+    largest: float, scales: list[tuple[Turn, float]], total: dict[Hypothesis, float]
 ) -> tuple[Finding, ...]:
     unit = next(iter(marginal(total, 0)))
     told = []
