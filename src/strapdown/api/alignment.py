@@ -18,11 +18,11 @@ from strapdown.errors import ConfigError
 from strapdown.formats import read_raw
 from strapdown.progress import Progress, silent
 from strapdown.report.outage import read_run_of_outage
-from strapdown.systems.alignment_run import AlignmentRun, run_alignment
+from strapdown.systems.alignment_run import AlignmentRun as AlignmentRun
+from strapdown.systems.alignment_run import run_alignment
 from strapdown.systems.inputs import NOWHERE, Memory
-from strapdown.systems.outage_run import OutageRun, run_outage
-
-__all__ = ["AlignmentRun", "OutageRun", "align", "outage", "specify_alignment"]
+from strapdown.systems.outage_run import OutageRun as OutageRun
+from strapdown.systems.outage_run import run_outage
 
 
 def align(

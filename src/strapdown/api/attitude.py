@@ -19,11 +19,13 @@ from strapdown.api.reading import ImuFile, imu_input, imu_of, imu_of_arrays
 from strapdown.attitude_algorithms import AttitudeTracker, attitude_history, make_algorithm
 from strapdown.attitude_algorithms.algorithm import history_of_samples
 from strapdown.attitude_comparison.comparison import (
-    AttitudeComparison,
+    AttitudeComparison as AttitudeComparison,
+)
+from strapdown.attitude_comparison.comparison import (
     initial_attitude,
     run_comparison,
 )
-from strapdown.attitude_comparison.options import AttitudeOptions
+from strapdown.attitude_comparison.options import AttitudeOptions as AttitudeOptions
 from strapdown.attitude_comparison.references import motion_finding
 from strapdown.attitude_comparison.source import magnetic_north
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
@@ -38,8 +40,12 @@ from strapdown.orientation_filters import (
 )
 from strapdown.progress import Progress, silent
 from strapdown.sensors.magnetometer import (
-    MagnetometerCalibration,
-    calibrate_magnetometer,
+    MagnetometerCalibration as MagnetometerCalibration,
+)
+from strapdown.sensors.magnetometer import (
+    calibrate_magnetometer as calibrate_magnetometer,
+)
+from strapdown.sensors.magnetometer import (
     without_iron,
 )
 from strapdown.sensors.rest import find_rests
@@ -50,17 +56,6 @@ from strapdown.tables.imu import imu_of_columns
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
-
-__all__ = [
-    "Attitude",
-    "AttitudeComparison",
-    "AttitudeOptions",
-    "MagnetometerCalibration",
-    "OrientationFilter",
-    "attitude",
-    "calibrate_magnetometer",
-    "compare_attitude",
-]
 
 Array = NDArray[np.float64]
 

@@ -22,8 +22,6 @@ from strapdown.report.crash_case import CRASH
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = ["CrashRun", "reconstruct"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CrashRun(CaseResult):

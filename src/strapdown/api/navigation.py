@@ -19,24 +19,8 @@ from strapdown.formats.gnss_fixes import POSITION_SDS
 from strapdown.progress import Progress, silent
 from strapdown.systems.inputs import NOWHERE, Memory
 from strapdown.systems.navigation_proposal import Proposal, propose
-from strapdown.systems.navigation_run import NavigationRun, run_navigation
-
-__all__ = [
-    "Barometer",
-    "BodyVelocity",
-    "Gnss",
-    "Heading",
-    "Magnetometer",
-    "Measurement",
-    "NavigationRun",
-    "NonHolonomic",
-    "Odometer",
-    "ZeroAngularRate",
-    "ZeroVelocity",
-    "navigate",
-    "specify_navigation",
-]
-
+from strapdown.systems.navigation_run import NavigationRun as NavigationRun
+from strapdown.systems.navigation_run import run_navigation
 
 # --- measurements -------------------------------------------------------------------------
 

@@ -27,28 +27,12 @@ from strapdown.formats import holds
 from strapdown.formats.aid_table import read_stream
 from strapdown.formats.gnss_files import read_gnss as read_gnss_table
 from strapdown.formats.gnss_fixes import GnssOptions
-from strapdown.formats.recording import ABSENT
+from strapdown.formats.recording import ABSENT as ABSENT
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
 from strapdown.tables.checks import view_of
 
 if TYPE_CHECKING:
     from strapdown.config.logs import LogTable
-
-__all__ = [
-    "ABSENT",
-    "GnssFile",
-    "GnssFixes",
-    "Imu",
-    "ImuFile",
-    "Streams",
-    "imu_input",
-    "keys_in",
-    "log_in",
-    "read",
-    "read_gnss",
-    "read_imu",
-    "table_input",
-]
 
 
 @dataclass(frozen=True)

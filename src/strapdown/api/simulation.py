@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
     from strapdown.sensors.crash_unit import CrashUnit
 
-__all__ = ["Simulation", "simulate"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Simulation:

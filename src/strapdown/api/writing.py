@@ -36,8 +36,6 @@ from strapdown.tables import GYRO, QUATERNION, attitude_table
 from strapdown.tables.checks import GEODETIC, MAG, POSITION_SD
 from strapdown.units import MAG_UNITS, PRESSURES, SPEEDS, TIME_UNITS, factor_of
 
-__all__ = ["read_streams", "write"]
-
 #: A column that identifies the stream of a table, in the order of the tests.
 _TELLS = (
     (GYRO[0], "imu"),

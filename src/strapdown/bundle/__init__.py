@@ -539,7 +539,7 @@ def unsealed_changes(
     `manifest`: from `read_manifest`. `moved`: from `found_references`. Returns a finding per file:
     changed, missing, a link, or not in the manifest.
     """
-    changes = []
+    changes: list[Finding] = []
     items = {item["name"]: item for item in [*manifest["inputs"], *manifest["outputs"]]}
     for name, item in items.items():
         own = item.get("kept", "copy") == "copy"
