@@ -115,7 +115,8 @@ class Reader:
         Whether a file or folder is of this format: by its content, then by its name.
     streams : mapping of str to callable
         Reader of each stream that the format may hold, by a name of `STREAMS`, or of `TABLE`. It
-        raises `NoStreamError` if this file lacks the stream.
+        raises `NoStreamError` if this file lacks the stream, and otherwise `DataError` if the file
+        is damaged, or not as its format has it.
     files : callable, optional
         Every file that is read for a path; the path itself by default.
     parts : bool

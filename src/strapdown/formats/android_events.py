@@ -192,10 +192,7 @@ def _advance(stamps: list[float]) -> bool:
 
 
 def read(path: Path) -> RawLog:
-    """Read the gyro, with the other sensors interpolated to its stamps.
-
-    DataError: a row has too few fields, or a value is not a number.
-    """
+    """Read the gyro, with the other sensors interpolated to its stamps."""
     text, findings = csv.decoded(path.read_bytes(), path.name)
     layout = _layout(text[: 1 << 16])
     if layout is None:

@@ -73,8 +73,7 @@ def read(path: Path) -> RawLog:
     """Read rates and specific force; from a folder, with the attitude truth beside them.
 
     `path`: ``data.csv`` of a sensor or of a ground truth; or the folder ``mav0``, ``imu0``, or the
-    parent of ``mav0``. For a ground truth alone, stamps and the attitude. DataError: a table is
-    damaged.
+    parent of ``mav0``. For a ground truth alone, stamps and the attitude.
     """
     if path.is_dir():
         return _folder(path)

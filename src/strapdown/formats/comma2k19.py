@@ -49,8 +49,7 @@ def read(path: Path) -> RawLog:
     """Read gyro, accelerometer, magnetometer and, if present, the pose as truth.
 
     `path`: the folder of a segment, its ``processed_log``, or the folder of the arrays. The truth
-    is at the gyro sample nearest to each camera frame. DataError: an array is damaged or has the
-    wrong shape.
+    is at the gyro sample nearest to each camera frame.
     """
     name = path.resolve().name
     logs, files = [], []
@@ -241,7 +240,7 @@ def read_fixes(path: Path) -> Fixes:
     """Read the fixes of a segment.
 
     Returns without standard deviations. Speed and bearing are converted to velocity north and east;
-    down is not measured. DataError: an array is damaged or has the wrong shape.
+    down is not measured.
     """
     files = files_of(path)
     if not files:

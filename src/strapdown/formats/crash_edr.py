@@ -503,7 +503,6 @@ def read(path: Path) -> CrashRecord:
 
     A channel for each column, under its heading; of the tables of one event the same `event`.
     Columns of one quantity in two units are one channel where they agree within their rounding.
-    DataError: the text holds no such table, or its stamps do not advance.
     """
     text, findings = csv.decoded(path.read_bytes(), path.name)
     found = _tables(text)

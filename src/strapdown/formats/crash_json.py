@@ -82,10 +82,7 @@ detect = Signs(first=rb"\A\s*+\{.{0,180}?" + FORMAT.encode())
 
 
 def read(path: Path) -> CrashRecord:
-    """Read a record written as JSON.
-
-    DataError: the file is truncated, or has another structure.
-    """
+    """Read a record written as JSON."""
     whole = _parsed(path)
     stamps = [
         _numbers(s, path, f"stamps_s {k}") for k, s in enumerate(_list(whole, "stamps_s", path))

@@ -40,10 +40,7 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> CrashRecord:
-    """Read a log of another format.
-
-    DataError: the file is damaged, or of none of these formats.
-    """
+    """Read a log of another format."""
     from strapdown.formats import READERS, read_raw
 
     for key in LOGS:
@@ -92,7 +89,7 @@ class CrashReader:
     module: str
 
     def read(self, path: Path) -> CrashRecord:
-        """Read a record of this format."""
+        """Read a record of this format. DataError: the file is damaged, or not as its format."""
         record: CrashRecord = import_module(f"strapdown.formats.{self.module}").read(path)
         return record
 

@@ -67,8 +67,7 @@ class ChannelName:
 def read(path: Path) -> CrashRecord:
     """Read a text table.
 
-    One channel for each numeric column, under its name. DataError: the file is not a table, or is
-    damaged.
+    One channel for each numeric column, under its name.
     """
     raw, notes, title, remarks = read_text_table(path)
     return record_of(raw, path, "csv", notes=notes, title=title, remarks=remarks)

@@ -79,7 +79,6 @@ def read(path: Path) -> RawLog:
 
     Columns that hold anything but numbers are left as text. Lines at the top that begin with ``#``,
     ``%``, ``//``, ``!`` or ``;`` are comments; the comment ``# sampling: mean`` is understood.
-    DataError: the file is empty, holds only a header, or is not text.
     """
     files = (path,)
     return _at_once(path, path.name, files) or _line_by_line(path.read_bytes(), path.name, files)

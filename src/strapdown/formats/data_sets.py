@@ -37,8 +37,7 @@ def read_broad(path: Path) -> RawLog:
     """Read a trial: sensor, optical attitude, and the samples that are scored.
 
     Sensor axes are taken as forward, left, up. The truth is rotated alike, so that error angles do
-    not depend on this choice. DataError: the file is damaged, or a dataset differs in length from
-    the gyro's.
+    not depend on this choice.
     """
     arrays, _, meta = hdf5.read_arrays(path)
     shapes = {n: arrays.get(n, np.empty(0)).shape for n in ("imu_gyr", "imu_acc", "opt_quat")}
@@ -93,10 +92,7 @@ detect_ronin = Signs(
 
 
 def read_ronin(path: Path) -> RawLog:
-    """Read rates, specific force and, if present, the magnetic field.
-
-    DataError: the file is damaged, or an array has the wrong shape.
-    """
+    """Read rates, specific force and, if present, the magnetic field."""
     arrays, _, _ = hdf5.read_arrays(path, (TIME, *TRIADS))
     for name in (TIME, GYRO, FORCE):
         if name not in arrays:
@@ -152,8 +148,8 @@ detect_mpu = Signs(folder=lambda path: (path / GYRO_FILE).is_file())
 def read_mpu(path: Path) -> RawLog:
     """Read the gyro, and the accelerometer if there is one.
 
-    An accelerometer with its own stamps is interpolated to those of the gyro.
-    The unused tail of a buffer is dropped. DataError: a file is damaged or has another layout.
+    An accelerometer with its own stamps is interpolated to those of the gyro. The unused tail of a
+    buffer is dropped.
     """
     findings: list[Finding] = []
     gyro = _buffer(path / GYRO_FILE, "gyroBuffer", findings)
@@ -236,10 +232,7 @@ detect_smartloc = Signs(text=r"\A" + "".join(f"(?=.*{re.escape(n)})" for n in (*
 
 
 def read_smartloc_fixes(path: Path) -> RawLog:
-    """Read position and velocity of the reference, once an epoch.
-
-    DataError: a column is missing, or a value is not a number.
-    """
+    """Read position and velocity of the reference, once an epoch."""
     raw = under(path)
     heading = next((n for n in raw.columns if n.startswith("Heading (0° = East, counterc")), "")
     held = {
@@ -309,10 +302,7 @@ def _log(path: Path) -> tuple[Array, Array]:
 
 
 def read_foot(path: Path) -> RawLog:
-    """Read rates and specific force.
-
-    DataError: the file is damaged, or its arrays have the wrong shapes.
-    """
+    """Read rates and specific force."""
     time, imu = _log(path)
     units = {"gyro": "rad/s", "accel": "m/s2"}
     columns = {n: (imu[:, k], units[n.partition("_")[0]]) for k, n in enumerate(COLUMNS)}

@@ -94,7 +94,7 @@ def read(path: Path) -> RawLog:
     """Read gyro, accelerometer and magnetometer, joined on the stamps of the gyro.
 
     Stamps in ns since 1970: the evenly advancing time since the phone's start, plus the median
-    offset of its wall clock. DataError: a line is damaged, or the log has no gyro.
+    offset of its wall clock.
     """
     findings: list[Finding] = []
     lines = _lines(path)
@@ -132,8 +132,7 @@ def read(path: Path) -> RawLog:
 def read_fixes(path: Path) -> Fixes:
     """Read the fixes of the receiver.
 
-    Returns stamps in s since 1970, on the clock of the sensors if the log has
-    it. DataError: the log has no fix, or a line is damaged.
+    Returns stamps in s since 1970, on the clock of the sensors if the log has it.
     """
     findings: list[Finding] = []
     lines = _lines(path)

@@ -74,8 +74,7 @@ def read(path: Path) -> Fixes:
     """Read the fixes of NMEA sentences.
 
     In seconds since 1970 if a date is stated, otherwise in seconds of the first day. Sentences with
-    a wrong checksum are dropped and counted. DataError: the file has no GGA, a field is not a
-    number, or some GGA lack the geoid undulation.
+    a wrong checksum are dropped and counted.
     """
     text, findings = csv.decoded(path.read_bytes(), path.name)
     epochs: list[_Epoch] = []

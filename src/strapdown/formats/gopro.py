@@ -85,10 +85,7 @@ detect = Signs(
 
 
 def read(path: Path) -> RawLog:
-    """Read the gyro, with the accelerometer interpolated to its stamps.
-
-    DataError: the file is damaged, or does not state its stamps or the order of its axes.
-    """
+    """Read the gyro, with the accelerometer interpolated to its stamps."""
     streams, clock = _streams(path)
     if "GYRO" not in streams:
         if "ACCL" in streams and len(_held(streams)) == 0:

@@ -30,8 +30,7 @@ detect = Signs(suffixes=SUFFIXES, also=_is_hdf5)
 def read(path: Path) -> RawLog:
     """Read the numeric datasets of an HDF5 file.
 
-    Datasets in groups are named ``group/dataset``. DataError: the file is not HDF5, is damaged, or
-    declares more data than it holds.
+    Datasets in groups are named ``group/dataset``.
     """
     arrays, units, meta = read_arrays(path)
     return raw_log(path, arrays, units, meta)
@@ -92,10 +91,7 @@ detect_matlab = Signs(suffixes=(".mat",), also=lambda path: not _is_hdf5(path))
 
 
 def read_matlab(path: Path) -> RawLog:
-    """Read the numeric arrays of a MATLAB file.
-
-    DataError: the file is not a MATLAB file, is damaged, or declares more data than it holds.
-    """
+    """Read the numeric arrays of a MATLAB file."""
     arrays, meta = read_matlab_arrays(path)
     return raw_log(path, arrays, {}, meta)
 

@@ -278,10 +278,7 @@ def files_of_xio(path: Path) -> tuple[Path, ...]:
 
 
 def read_xio(path: Path) -> RawLog:
-    """Read rates and specific force, without rows that repeat the one before.
-
-    DataError: the table is damaged.
-    """
+    """Read rates and specific force, without rows that repeat the one before."""
     raw = under(path / TABLE if path.is_dir() else path)
     time = next(t for t in TIMES if t in raw.columns)
     held = {q: column(raw, n) for q, (n, _) in NAMES.items()}
@@ -344,7 +341,6 @@ def read_xsens(path: Path) -> RawLog:
     """Read rates and specific force, with stamps from the counters.
 
     Stamps in µs of ``SampleTimeFine``; without it, of ``PacketCounter`` and the stated rate.
-    DataError: the file is damaged, or the tick of the clock is not known.
     """
     data = path.read_bytes()
     raw = csv.parse(data, path.name, (path,))

@@ -92,8 +92,7 @@ def read(path: Path) -> RawLog:
     """Read increments of angle and velocity.
 
     Columns `COLUMNS`, in s, rad, m/s. Axes forward, right, down if gravity is on the third axis,
-    downward; otherwise not stated. DataError: the file is not text, a row has another width, or the
-    numbers are not increments.
+    downward; otherwise not stated.
     """
     raw = csv.read(path)
     names = list(raw.columns)
@@ -164,10 +163,7 @@ detect_fixes = Signs(
 
 
 def read_fixes(path: Path) -> Fixes:
-    """Read fixes without a header.
-
-    DataError: the number of columns differs, or a value is not a number.
-    """
+    """Read fixes without a header."""
     raw = csv.read(path)
     names = WITH_VELOCITY if len(raw.columns) == len(WITH_VELOCITY) else NAMES
     if len(raw.columns) != len(names):

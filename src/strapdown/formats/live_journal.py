@@ -156,10 +156,7 @@ def event_streams(run: dict[str, Any]) -> SensorStreams:
 
 
 def read(path: Path) -> RawLog:
-    """Read gyro, specific force and magnetic field as the session used them.
-
-    DataError: the journal is damaged, or has no samples.
-    """
+    """Read gyro, specific force and magnetic field as the session used them."""
     run, rows, streams = _received(path)
     joined = [one for one in rows if isinstance(one, Joined)]
     name = path.resolve().name

@@ -39,8 +39,7 @@ _TITLES = ("title", "type of the test", "laboratory test ref. number", "test nam
 def read(path: Path) -> CrashRecord:
     """Read a test; samples are read when a channel is used.
 
-    `path`: the ``.mme`` file, or the folder that holds it. DataError: no header, several headers,
-    no channel, or a damaged header.
+    `path`: the ``.mme`` file, or the folder that holds it.
     """
     head = header_of(path, ".mme", "io.folder-holds-tests", "io.no-mme-file")
     header = read_header(head)

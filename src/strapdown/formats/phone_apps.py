@@ -67,10 +67,7 @@ def _named(names: list[str]) -> dict[str, str]:
 
 
 def read_core_motion(path: Path) -> RawLog:
-    """Read the rates, and specific force from gravity and user acceleration.
-
-    DataError: the table is damaged, or a value is not a number.
-    """
+    """Read the rates, and specific force from gravity and user acceleration."""
     raw = under(path)
     named = _named(list(raw.columns))
     missing = [f"{v}_{a}" for v in WORDS for a in "xyz" if f"{v}_{a}" not in named]

@@ -51,8 +51,7 @@ detect = Signs(
 def read(path: Path) -> RawLog:
     """Read each sensor's table, joined on the stamps of the gyro.
 
-    Columns named x, y, z belong to the sensor after which their table is named. DataError: the
-    archive or a table is damaged, or the gyro is missing.
+    Columns named x, y, z belong to the sensor after which their table is named.
     """
     name = path.resolve().name
     members = members_of(path)

@@ -95,10 +95,7 @@ detect = Signs(
 
 
 def read(path: Path) -> RawLog:
-    """Read gyro, specific force and magnetic field, joined on the stamps of the gyro.
-
-    DataError: a file is damaged, or the gyroscope is missing.
-    """
+    """Read gyro, specific force and magnetic field, joined on the stamps of the gyro."""
     name = path.resolve().name
     sensors, meta, files, _ = _tables(path, SENSORS)
     if not sensors and path.is_file() and detect(path):

@@ -84,8 +84,7 @@ def read(path: Path) -> RawLog:
     """Read rates and specific force, joined on the stamps of the gyro.
 
     Rates of the fused motion, which the phone has corrected for its bias, or else of the gyro;
-    specific force from user acceleration and gravity, or else the accelerometer. DataError: the
-    file is damaged, or its sensors have no stamps.
+    specific force from user acceleration and gravity, or else the accelerometer.
     """
     raw = csv.parse(path.read_bytes(), path.name, (path,))
     have = set(raw.columns)

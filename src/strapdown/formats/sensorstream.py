@@ -60,8 +60,7 @@ def read(path: Path) -> RawLog:
     """Read the blocks of each sensor, joined on the stamps of the gyro.
 
     Lines without a gyro are not samples; accelerometer or magnetic field from other lines are
-    interpolated to the stamps of the gyro. DataError: a line has another format, or no line has a
-    gyro.
+    interpolated to the stamps of the gyro.
     """
     text, findings = decoded(path.read_bytes(), path.name)
     numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]

@@ -36,10 +36,7 @@ detect_excel = Signs(suffixes=(".xlsx", ".xlsm"), first=rb"\APK\x03\x04")
 
 
 def read_excel_table(path: Path) -> RawLog:
-    """Read the sheet with the most numbers.
-
-    DataError: the library is missing, the file is damaged, or no sheet has numbers.
-    """
+    """Read the sheet with the most numbers."""
     sheets = parse("workbooks.sheets", path)
     counts = {
         name: sum(isinstance(c, int | float) for row in rows for c in row)
@@ -110,11 +107,7 @@ detect_json = Signs(suffixes=(*JSON_SUFFIXES, ".txt", ".log"), text=r"\A\s*+[\[{
 
 
 def read_json_table(path: Path) -> RawLog:
-    """Read the members of the objects as columns, missing ones as NaN.
-
-    DataError: a line is not JSON, a value is neither a number nor a text, or the file has no
-    object.
-    """
+    """Read the members of the objects as columns, missing ones as NaN."""
     if _APART.search(head(path)):
         return _names_apart(path)
     objects, rows, findings = _objects(path)
@@ -247,10 +240,7 @@ detect_labview = Signs(text=rf"\A{LABVIEW_MAGIC}")
 
 
 def read_labview_table(path: Path) -> RawLog:
-    """Read the channels, with the units that the header states.
-
-    DataError: the header does not end, or a second one follows the rows.
-    """
+    """Read the channels, with the units that the header states."""
     text, _ = csv.decoded(path.read_bytes(), path.name)
     lines = text.split("\n")
     ends = [k for k, line in enumerate(lines) if line.startswith(END)]
@@ -281,11 +271,7 @@ detect_numpy = Signs(named=(".npz",))
 
 
 def read_numpy_table(path: Path) -> RawLog:
-    """Read the arrays of a NumPy archive; its content is never executed.
-
-    DataError: the file is not an archive, is damaged, declares too much data, or holds Python
-    objects.
-    """
+    """Read the arrays of a NumPy archive; its content is never executed."""
     found = arrays_of(path)
     arrays = {name: array for name, array in found.items() if array.ndim}
     meta = {name: array for name, array in found.items() if not array.ndim}
@@ -338,9 +324,7 @@ detect_numpy_folder = Signs(
 def read_numpy_folder_table(path: Path) -> RawLog:
     """Read every array of the folder, each under its file name.
 
-    Returns arrays that differ in length from the gyro's are dropped and listed. DataError: an array
-    is damaged, declares more data than it holds, or holds Python objects; or the stamps differ in
-    length from the gyro.
+    Returns arrays that differ in length from the gyro's are dropped and listed.
     """
     name = path.resolve().name
     arrays: dict[str, NDArray[Any]] = {}
@@ -372,8 +356,7 @@ def read_parquet(path: Path) -> RawLog:
 
     Columns of structures are named ``structure.field``, those of lists of equal length ``list[0]``,
     ``list[1]`` …; missing values are NaN. The metadata ``unit`` or ``units`` of a field, and
-    ``sampling``, ``axes`` and a rate of the table, are understood. DataError: the file is damaged,
-    or declares far more data than it holds.
+    ``sampling``, ``axes`` and a rate of the table, are understood.
     """
     found = parse("parquet.table", path, room=room)
     return raw_log(path, found["arrays"], found["units"], found["meta"])

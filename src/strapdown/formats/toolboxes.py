@@ -71,10 +71,7 @@ def files_of_gnss_ins_sim(path: Path) -> tuple[Path, ...]:
 
 
 def read_gnss_ins_sim(path: Path) -> RawLog:
-    """Read rates, specific force and magnetic field of the first run.
-
-    DataError: a table is missing or damaged, or has another number of rows than the stamps.
-    """
+    """Read rates, specific force and magnetic field of the first run."""
     path = _folder(path)
     findings: list[Finding] = []
     time = _columns(path, path / "time.csv", findings)
@@ -351,8 +348,7 @@ def read_psins(path: Path) -> RawLog:
     A SIMU log is converted with the scale factors and clock of its header, whose position and
     attitude are kept as `StatedStart`. A plain matrix of seven columns is accepted if the last is a
     steady clock and the norm of the velocity increments over a step is that of gravity. Any other
-    text is read as a table. DataError: the file is not text, the header is invalid, or a row has
-    another width or no integer.
+    text is read as a table.
     """
     data = path.read_bytes()
     text, findings = csv.decoded(data, path.name)
@@ -591,10 +587,7 @@ def _arrays(path: Path, stream: str, width: int) -> tuple[Array, Array]:
 
 
 def read_python_ins(path: Path) -> RawLog:
-    """Read the angular rates and specific force.
-
-    DataError: the archive is damaged, or its arrays have the wrong shapes.
-    """
+    """Read the angular rates and specific force."""
     time, imu = _arrays(path, "imu", len(COLUMNS))
     units = {"gyro": "rad/s", "accel": "m/s2"}
     columns = {n: (imu[:, k], units[n.partition("_")[0]]) for k, n in enumerate(COLUMNS)}

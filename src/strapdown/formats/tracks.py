@@ -48,10 +48,7 @@ detect_gpx = Signs(text=r"\A[\s\S]{0,4092}?<gpx")
 
 
 def read_gpx_fixes(path: Path) -> RawLog:
-    """Read the points that have a time.
-
-    DataError: the library is missing, the XML is damaged, or no point has a time.
-    """
+    """Read the points that have a time."""
     points = parse("recorders.gpx", path)
     times = points["time"]
     timed = np.array([t is not None for t in times], dtype=bool)
@@ -188,10 +185,7 @@ detect_fit = Signs(first=rb"\A[\x0c\x0e].{7}\.FIT")
 
 
 def read_fit(path: Path) -> RawLog:
-    """Read the gyro, with accelerometer and magnetometer interpolated to its stamps.
-
-    DataError: the library is missing, or the file is damaged.
-    """
+    """Read the gyro, with accelerometer and magnetometer interpolated to its stamps."""
     messages = _messages(path)
     logs = [_sensor(path, messages, triad) for triad in SENSORS if messages[SENSORS[triad][0]]]
     if not messages["gyroscope_data"]:
@@ -361,10 +355,7 @@ detect_dji = Signs(text=r"\A[\s\S]{0,4080}?\d:\d\d:\d\d[,.]\d{1,3}\s*-->", also=
 
 
 def read_dji_fixes(path: Path) -> RawLog:
-    """Read the positions.
-
-    DataError: no subtitle has a position, or the angles may be in radians.
-    """
+    """Read the positions."""
     text, findings = csv.decoded(path.read_bytes(), path.name)
     starts = list(_TIME.finditer(text))
     ends = [*(m.start() for m in starts[1:]), len(text)]
