@@ -458,7 +458,12 @@ def _numbered(tables: list[_Table]) -> list[_Table]:
     """
     if any(t.event for t in tables):
         return [t if t.event else replace(t, event=1) for t in tables]
-    crash = [k for k, t in enumerate(tables) if _is_of_crash(t)]
+    moves = {"velocity", "acceleration"}
+    crash = [
+        k
+        for k, t in enumerate(tables)
+        if moves & {c.said.quantity for c in t.columns if c.said.axis}
+    ]
     others = [k for k in range(len(tables)) if k not in crash]
     events = _groups(tables, crash)
     out = list(tables)
@@ -470,11 +475,6 @@ def _numbered(tables: list[_Table]) -> list[_Table]:
         known = len(others) == len(events)
         out[m] = replace(out[m], event=k + 1 if known or not events else 0)
     return out
-
-
-def _is_of_crash(table: _Table) -> bool:
-    kinds = {c.said.quantity for c in table.columns if c.said.axis}
-    return bool(kinds & {"velocity", "acceleration"})
 
 
 def _groups(tables: list[_Table], crash: list[int]) -> list[list[int]]:

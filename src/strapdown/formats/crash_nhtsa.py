@@ -63,6 +63,9 @@ def read(path: Path) -> CrashRecord:
     there = [c for c in test.channels if c.path is not None]
     vehicles = {v.number for v in test.vehicles} or {c.vehicle for c in there} - {0}
     points = _points(there, vehicles)
+    # The only vehicle met a rigid barrier.
+    rigid = [fields[0].upper() for fields in test.barrier if fields] == ["R"]
+    against = {"against": "barrier"} if rigid and len(test.vehicles) == 1 else {}
     dummies = {
         (fields[0], fields[1]): _DUMMIES.get((fields[2], fields[8]), "")
         for fields in test.occupants
@@ -79,7 +82,7 @@ def read(path: Path) -> CrashRecord:
         ),
         files=(test.path, *(c.path for c in there if c.path is not None)),
         findings=(*test.findings, *_unknown_codes(there, test.path)),
-        vehicles={str(v.number): _stated(_vehicle(v) | _against(test)) for v in test.vehicles},
+        vehicles={str(v.number): _stated(_vehicle(v) | against) for v in test.vehicles},
     )
 
 
@@ -97,12 +100,6 @@ def _facts(test: CrashTest) -> dict[str, str]:
             "impact angle, deg": _plain(test.impact_angle_deg),
         }
     )
-
-
-def _against(test: CrashTest) -> dict[str, str]:
-    """Whether the only vehicle met a rigid barrier."""
-    rigid = [fields[0].upper() for fields in test.barrier if fields] == ["R"]
-    return {"against": "barrier"} if rigid and len(test.vehicles) == 1 else {}
 
 
 def _stated(facts: dict[str, str]) -> dict[str, str]:

@@ -213,16 +213,12 @@ def read_crash_record(
         ) from error
 
 
-def _names_beside(file: Path) -> list[str]:
-    try:
-        return sorted(p.name for p in islice(file.absolute().parent.iterdir(), MOST_NAMES))
-    except OSError:
-        return []
-
-
 def _read(file: Path, form: str | None) -> CrashRecord:
     if not file.exists():
-        near = difflib.get_close_matches(file.name, _names_beside(file), n=1)
+        beside: list[str] = []
+        with suppress(OSError):
+            beside = sorted(p.name for p in islice(file.absolute().parent.iterdir(), MOST_NAMES))
+        near = difflib.get_close_matches(file.name, beside, n=1)
         raise ConfigError(
             "io.no-such-record-but-near" if near else "io.no-such-record",
             file=clean(str(file)),

@@ -147,10 +147,13 @@ def _codes(channels: list[CrashChannel]) -> dict[str, str]:
     codes = {c.name: c.name for c in channels if _is_code(c.name)}
     taken = {code.upper() for code in codes.values()}
     points: dict[str, list[str]] = {}
+    letters = {words: letter for letter, words in FILTERS.items()}
     for channel in channels:
         if channel.name in codes:
             continue
-        start, end = _object_and_place(channel), _ending(channel)
+        start = _object_and_place(channel)
+        end = _DIMENSIONS[channel.quantity] + _DIRECTIONS.get(channel.axis, "0")
+        end += letters.get(channel.low_pass, NO_CLASS)
         # Points of one location differ in their numbers, whatever axes each has.
         of_start = points.setdefault(start, [])
         point = channel.point or position_of(channel.place)
@@ -176,12 +179,6 @@ def _object_and_place(channel: CrashChannel) -> str:
     seat = "1" if body.startswith("driver") else "3" if body.startswith("front passenger") else "0"
     number = channel.vehicle if channel.vehicle in _NUMBERS else "1" if not channel.vehicle else "0"
     return f"{'B' if body == 'barrier' else number}{seat}{main}"
-
-
-def _ending(channel: CrashChannel) -> str:
-    letters = {words: letter for letter, words in FILTERS.items()}
-    direction = _DIRECTIONS.get(channel.axis, "0")
-    return _DIMENSIONS[channel.quantity] + direction + letters.get(channel.low_pass, NO_CLASS)
 
 
 def _check(channel: CrashChannel, time: Array, values: Array) -> None:

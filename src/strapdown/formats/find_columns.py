@@ -403,7 +403,12 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
         members = {f"{triad}_{axis}": name for axis, name in first.items()}
         found |= {q: name for q, name in members.items() if q not in wanted}
         if len(kept) > 1 and not wanted.keys() & members.keys():
-            _ask_which(raw, triad, list(kept.values()), questions)
+            # The first is the answer as inferred.
+            several = list(kept.values())
+            axis = next(iter(sorted(several, key=len)[0]))
+            names = [m[axis] for m in several if axis in m]
+            which = _several(raw, f"{triad}_{axis}", names, names[0])
+            questions.ask(which, **_answer(raw, triad, several[0]))
     rest: dict[str, list[str]] = {}
     for name, one in said.items():
         if one.quantity in QUANTITIES and not one.family:
@@ -523,14 +528,6 @@ def _several(raw: RawLog, quantity: str, names: list[str], first: str) -> Findin
         of_what=quantity,
         names_2=first,
     )
-
-
-def _ask_which(raw: RawLog, triad: str, kept: list[Family], questions: Questions) -> None:
-    """Ask which of several sensors to use; the first is the answer as inferred."""
-    axis = next(iter(sorted(kept, key=len)[0]))
-    names = [m[axis] for m in kept if axis in m]
-    answer = _answer(raw, triad, kept[0])
-    questions.ask(_several(raw, f"{triad}_{axis}", names, names[0]), **answer)
 
 
 def _answer(raw: RawLog, triad: str, family: Family) -> dict[str, str]:

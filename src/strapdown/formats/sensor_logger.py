@@ -80,8 +80,10 @@ def _has_sensor(path: Path) -> bool:
         text = head(path, 4096)
         return text.lstrip().startswith("[") and '"sensor"' in text
     members = peek(path) if is_container(path) else [file_member(path)]
-    return any(_sensor(m) in SENSORS and _has_header(m) for m in members) or any(
-        _is_located(m) for m in members
+    return any(
+        (_sensor(m) in SENSORS and _has_columns(m, "x", "y", "z"))
+        or (_sensor(m) in STREAMS["gnss"][0] and _has_columns(m, "latitude", "longitude"))
+        for m in members
     )
 
 
@@ -139,33 +141,23 @@ def _read_stream(path: Path, stream: str) -> RawLog:
     tables, _, _, held = _tables(path, kinds)
     for kind in kinds:
         if kind in tables:
-            return _stated(tables[kind], wanted)
+            raw = tables[kind]
+            stated: dict[str, tuple[str, str | None]] = {"time": ("time", "ns")}
+            stated |= {c: (q, u) for q, (c, u) in wanted.items() if c in raw.columns}
+            raw.stated, raw.clock = stated, UNIX
+            return raw
     there = [s for s, (k, _) in STREAMS.items() if set(k) & held]
     there += ["imu"] * bool(set(GYROS) & held)
     raise lacking(path, stream, TITLE, there)
-
-
-def _stated(raw: RawLog, wanted: dict[str, tuple[str, str]]) -> RawLog:
-    stated: dict[str, tuple[str, str | None]] = {"time": ("time", "ns")}
-    stated |= {c: (q, u) for q, (c, u) in wanted.items() if c in raw.columns}
-    raw.stated, raw.clock = stated, UNIX
-    return raw
-
-
-def _is_located(member: Member) -> bool:
-    if _sensor(member) not in STREAMS["gnss"][0]:
-        return False
-    fields = {f.strip().strip('"').lower() for f in first_line(member).split(",")}
-    return {"time", "seconds_elapsed", "latitude", "longitude"} <= fields
 
 
 def _sensor(member: Member) -> str:
     return _COPY.sub("", member.stem) if member.suffix == ".csv" else ""
 
 
-def _has_header(member: Member) -> bool:
+def _has_columns(member: Member, *names: str) -> bool:
     fields = {f.strip().strip('"').lower() for f in first_line(member).split(",")}
-    return {"time", "seconds_elapsed", "x", "y", "z"} <= fields
+    return {"time", "seconds_elapsed", *names} <= fields
 
 
 def _tables(

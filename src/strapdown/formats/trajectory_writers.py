@@ -347,20 +347,14 @@ def write_kml(path: Path, trajectory: pd.DataFrame, options: FileOptions | None 
 
     Parameters
     ----------
-    path : Path
-    trajectory : DataFrame
-        A Trajectory or Gnss table of one row or more, on WGS 84.
-    options : FileOptions, optional
-        With `epoch`, a track with dates (``gx:Track``, Google's extension) is written in
-        addition to the path. More than `most_points` rows are thinned to those that preserve
-        the path best (`thin`).
+    path, trajectory, options
+        As `write_geojson`. With `epoch`, a track with dates (``gx:Track``, Google's extension) is
+        written in addition to the path.
 
     Raises
     ------
-    ConfigError
-        The ellipsoid is not WGS 84.
-    DataError
-        The table is not valid, or has no rows.
+    ConfigError, DataError
+        As `write_geojson`.
 
     Notes
     -----

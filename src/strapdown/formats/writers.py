@@ -300,19 +300,12 @@ def _write_geoparquet(path: Path, tables: Tables, options: FileOptions) -> list[
 
 
 def _write_npz(path: Path, tables: Tables, options: FileOptions) -> None:
-    said: dict[str, Array] = {}
-    arrays = _three_columns(tables)
-    if "imu" in tables:
-        stated = imu_columns(tables["imu"], None)[1]
-        said = {key: np.array(text) for key, text in stated.items()}
-    table_files.write_numpy(path, arrays | said)
+    said = {key: np.array(text) for key, text in _columns(tables)[1].items()}
+    table_files.write_numpy(path, _three_columns(tables) | said)
 
 
 def _write_mat(path: Path, tables: Tables, options: FileOptions) -> None:
-    said = {}
-    if "imu" in tables:
-        said = imu_columns(tables["imu"], None)[1]
-    hdf5.write_matlab(path, _three_columns(tables), said)
+    hdf5.write_matlab(path, _three_columns(tables), _columns(tables)[1])
 
 
 def _three_columns(tables: Tables) -> dict[str, Array]:
