@@ -113,24 +113,10 @@ def specify_alignment(
 ) -> AlignmentSpec:
     """Build the specification of an alignment; its position may come from the log.
 
-    Parameters
-    ----------
-    log : ImuFile
-    site, sensor, fine
-        As `align`.
-    gnss : mapping, optional
-        The file of fixes, as the table ``gnss`` of a configuration.
-    coarse, prefilter : mapping
-        The module with its options, including ``kind``.
-    called : callable
-        Name of an argument in the interface, for messages: ``sensor`` as ``--sensor``.
-
-    Raises
-    ------
-    ConfigError
-        A required argument is missing; the message names it.
-    DataError
-        The log cannot be read.
+    `site`, `sensor`, `fine`: as `align`. `gnss`: the file of fixes, as the table ``gnss`` of a
+    configuration. `coarse`, `prefilter`: the module with its options, including ``kind``. `called`:
+    name of an argument in the interface, for messages: ``sensor`` as ``--sensor``. ConfigError: a
+    required argument is missing; the message names it. DataError: the log cannot be read.
     """
     if sensor is None:
         raise ConfigError("api.no-sensor-for-alignment", quantity=called("sensor"))

@@ -243,22 +243,10 @@ def specify_navigation(
 ) -> NavigationSpec:
     """Build the specification of a run over a log, completed from the log and the fixes.
 
-    Parameters
-    ----------
-    log : ImuFile
-    aids : mapping of str to mapping
-        By name, the configuration table of each measurement.
-    sensor, start, options
-        As `navigate`.
-    called : callable
-        Name of an argument in the interface, for messages: ``sensor`` as ``--sensor``.
-
-    Raises
-    ------
-    ConfigError
-        A required argument is missing; the message names it.
-    DataError
-        A file cannot be read.
+    `aids`: by name, the configuration table of each measurement. `sensor`, `start`, `options`: as
+    `navigate`. `called`: name of an argument in the interface, for messages: ``sensor`` as
+    ``--sensor``. ConfigError: a required argument is missing; the message names it. DataError: a
+    file cannot be read.
     """
     receiver = next((n for n, a in aids.items() if a["kind"] == "gnss" and a.get("path")), None)
     known = dict(start or {})

@@ -39,13 +39,9 @@ if TYPE_CHECKING:
 class ImuFile:
     """A recorded log that has not been read yet, and its reading options.
 
-    Attributes
-    ----------
-    log : LogTable
-        Path, columns, units, sampling, and the part to use.
-    axes : str or None
-        Sensor axes that point forward, right, down (``x,-y,-z``), or directions of the sensor's x,
-        y and z axes (``forward-left-up``).
+    `log`: path, columns, units, sampling, and the part to use. `axes`: sensor axes that point
+    forward, right, down (``x,-y,-z``), or directions of the sensor's x, y and z axes
+    (``forward-left-up``).
     """
 
     log: LogTable
@@ -70,13 +66,7 @@ class ImuFile:
 
 @dataclass(frozen=True)
 class GnssFile:
-    """A file of fixes, and its reading options.
-
-    Attributes
-    ----------
-    path : str
-    options : GnssOptions
-    """
+    """A file of fixes, and its reading options."""
 
     path: str
     options: GnssOptions
@@ -435,18 +425,9 @@ def log_table(log: ImuFile | pd.DataFrame, file: Path, stated: Mapping[str, Any]
 def imu_input(source: Any) -> ImuFile | pd.DataFrame:
     """Samples in any form as a file still to be read, or as a checked Imu table.
 
-    Parameters
-    ----------
-    source : str, Path, ImuFile, DataFrame, or (t, gyro, accel)
-        An unchanged Imu from `read_imu` is represented by its file. A DataFrame has the columns of
-        an Imu table, and its time in s as index or in a column ``time``.
-
-    Raises
-    ------
-    DataError
-        A column is missing, or a value cannot be used.
-    ConfigError
-        The argument is none of these.
+    `source`: an unchanged Imu from `read_imu` is represented by its file. A DataFrame has the
+    columns of an Imu table, and its time in s as index or in a column ``time``. DataError: a column
+    is missing, or a value cannot be used. ConfigError: the argument is none of these.
     """
     if isinstance(source, ImuFile):
         return source
@@ -466,16 +447,7 @@ def imu_input(source: Any) -> ImuFile | pd.DataFrame:
 def table_input(data: Any, quantity: str) -> str | GnssFile | pd.DataFrame:
     """Source of a measurement: a path, a file with its options, or a table by time.
 
-    Parameters
-    ----------
-    data : str, Path or DataFrame
-    quantity : str
-        For messages.
-
-    Raises
-    ------
-    ConfigError
-        The argument is none of these.
+    `quantity`: for messages. ConfigError: the argument is none of these.
     """
     if isinstance(data, str | Path):
         return str(data)
@@ -505,10 +477,7 @@ def keys_in(data: str | GnssFile | pd.DataFrame, file: Path) -> dict[str, Any]:
 def imu_of(source: Any) -> pd.DataFrame:
     """Samples in any form as a checked Imu table; a file is read.
 
-    Parameters
-    ----------
-    source : object
-        As `imu_input`.
+    `source`: as `imu_input`.
     """
     given = imu_input(source)
     return given.read() if isinstance(given, ImuFile) else given

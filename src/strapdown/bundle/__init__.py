@@ -573,23 +573,10 @@ def _is_linked(bundle: Path, name: str) -> bool:
 def found_references(manifest: dict[str, Any], given: Sequence[Path]) -> dict[str, Path]:
     """Find the inputs that a bundle refers to, among the files and folders that the user allows.
 
-    Parameters
-    ----------
-    manifest : dict
-        From `read_manifest`.
-    given : sequence of Path
-        Files or folders. An input may have moved: a file is found by its digest, a folder takes the
-        place of the recorded one.
-
-    Returns
-    -------
-    dict of str to Path
-        From each recorded path, of files and of folders, to where it is now.
-
-    Raises
-    ------
-    ConfigError
-        An input is not covered by `given`: a manifest may name any file of this machine.
+    `manifest`: from `read_manifest`. `given`: files or folders. An input may have moved: a file is
+    found by its digest, a folder takes the place of the recorded one. From each recorded path, of
+    files and of folders, to where it is now. ConfigError: an input is not covered by `given`: a
+    manifest may name any file of this machine.
     """
     folders = [Path(p) for p in named_paths(manifest["configuration"])]
     found: dict[str, Path] = {}

@@ -80,10 +80,8 @@ def claimed(out: Path, force: bool = False) -> Iterator[Path]:
     Folders above it are created, and removed if they are empty at the end. A thread that holds
     the name may claim it again. Yields the destination with symbolic links resolved.
 
-    Raises
-    ------
-    ConfigError
-        Another run holds the name, its folder cannot be created, or as `check_destination`.
+    ConfigError: another run holds the name, its folder cannot be created, or as
+    `check_destination`.
     """
     out = Path(os.path.realpath(out))
     me = (threading.get_ident(),)

@@ -45,16 +45,9 @@ LOWEST, HIGHEST = -2_000.0, 50_000.0
 def standard_height(pressure_pa: ArrayLike) -> Array:
     """Compute the height at which the standard atmosphere has a pressure.
 
-    Parameters
-    ----------
-    pressure_pa : array_like, (n,), Pa
-        22 632 (at 11 km of geopotential height) to 120 000.
-
-    Returns
-    -------
-    ndarray, (n,), m
-        Geometric, above mean sea level. ``H = T0 / L (1 - (p / p0)^(R L / g))``,
-        ``h = r H / (r - H)``: US Standard Atmosphere (1976), Eqs. (33a), (19).
+    `pressure_pa` ((n,), Pa): 22 632 (at 11 km of geopotential height) to 120 000. Returns (n,), m:
+    geometric, above mean sea level. ``H = T0 / L (1 - (p / p0)^(R L / g))``, ``h = r H / (r - H)``:
+    US Standard Atmosphere (1976), Eqs. (33a), (19).
     """
     ratio = np.asarray(pressure_pa, dtype=np.float64) / PRESSURE
     geopotential = TEMPERATURE / LAPSE * (1.0 - ratio**EXPONENT)

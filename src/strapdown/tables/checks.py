@@ -293,14 +293,8 @@ RELATIVE = "relative"
 class Gap:
     """A gap in a record.
 
-    Attributes
-    ----------
-    start, end : float, s
-        The stamps on either side.
-    usual : float, s
-        The usual step of the record.
-    sample : int
-        Index of the sample after the gap, from 0.
+    `start`, `end` (s): the stamps on either side. `usual` (s): the usual step of the record.
+    `sample`: index of the sample after the gap, from 0.
     """
 
     start: float
