@@ -246,7 +246,10 @@ def raw_log(
             file=path.name,
             arrays=", ".join([*arrays, *meta]) or "nothing",
         )
-    samples = _samples(columns)
+    # The length of the gyro's arrays, or else the most common length.
+    rates = [c.size for n, c in columns.items() if str(read_name(n).quantity).startswith("gyro")]
+    lengths = rates or [c.size for c in columns.values()]
+    samples = int(max(set(lengths), key=lengths.count))
     findings = _left_out(columns, samples, path.name)
     columns = {n: c for n, c in columns.items() if c.size == samples}
     return RawLog(
@@ -300,13 +303,6 @@ def _columns(name: str, array: NDArray[Any], stamps: Set[int]) -> dict[str, NDAr
     if rows.shape[1] > 16:
         return {}
     return {f"{name}[{k}]": np.ascontiguousarray(rows[:, k]) for k in range(rows.shape[1])}
-
-
-def _samples(columns: dict[str, NDArray[Any]]) -> int:
-    """Return the length of the gyro's arrays, or else the most common length."""
-    lengths = [c.size for n, c in columns.items() if str(read_name(n).quantity).startswith("gyro")]
-    lengths = lengths or [c.size for c in columns.values()]
-    return int(max(set(lengths), key=lengths.count))
 
 
 def _rate(meta: dict[str, Any]) -> float | None:

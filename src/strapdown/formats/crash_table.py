@@ -380,10 +380,8 @@ def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
             notes[names[column - 1]] = checked
         except (DataError, ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
             reason = error.finding if isinstance(error, DataError) else None
-            add_note(
-                raw.findings,
+            raw.note(
                 "io.comment-of-no-channel" if reason is None else "io.comment-left-out",
-                file=raw.name,
                 row=row,
                 reason=reason,
             )

@@ -954,7 +954,10 @@ def _was_cut(line: str, before: Lines, top: _Top, ended: bool) -> bool:
 
 def _parse(lines: list[str], count: int, separator: str | None, name: str) -> Columns:
     """Parse the lines under the header, each number to the nearest double."""
-    decimal = "," if _comma_is_decimal(lines, separator) else "."
+    line = next((line for line in lines if "," in line), "")
+    numbers = [f for f in fields_of(line, separator) if _NUMBER.fullmatch(f)]
+    comma = any("," in n for n in numbers) and not any("." in n for n in numbers)
+    decimal = "," if comma else "."
     if separator is None:
         lines = ["\t".join(line.split()) for line in lines]
     if separator and separator.strip() and any(f"{separator} " in line for line in lines[:JUDGED]):
@@ -974,12 +977,6 @@ def _parse(lines: list[str], count: int, separator: str | None, name: str) -> Co
         raise DataError(
             "io.rows-cannot-taken-apart", file=name, splitlines=str(error).splitlines()[0]
         ) from None
-
-
-def _comma_is_decimal(lines: list[str], separator: str | None) -> bool:
-    line = next((line for line in lines if "," in line), "")
-    numbers = [f for f in fields_of(line, separator) if _NUMBER.fullmatch(f)]
-    return any("," in n for n in numbers) and not any("." in n for n in numbers)
 
 
 #: Rows that are written at a time.

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, add_note, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock
@@ -120,8 +120,10 @@ def _refuse_missing(raw: RawLog, found: dict[str, Found], *, stated: bool) -> No
     """
     missing = [q for q in ("time",) if q not in found]
     if not any(set(one) <= found.keys() for one in (_GEODETIC, _ECEF, _LOCAL)):
-        if not missing and (axes := _bare_axes(raw)):
-            x, y, z = axes
+        # Columns that are called x, y, z may be coordinates.
+        bare = {m[1].lower(): n for n in raw.columns if (m := _AXIS.fullmatch(n.strip()))}
+        if not missing and len(bare) == 3:
+            x, y, z = axes = [bare[axis] for axis in "xyz"]
             xyz = np.column_stack([numbers(raw, c, c) for c in axes])
             far = np.nanmedian(np.linalg.norm(np.asarray(xyz, dtype=np.float64), axis=1))
             if _NEAR_EARTH[0] < far < _NEAR_EARTH[1]:
@@ -149,12 +151,6 @@ def _refuse_missing(raw: RawLog, found: dict[str, Found], *, stated: bool) -> No
 #: Distances from the center of the Earth that a position on it, or near it, may have, m.
 _NEAR_EARTH = (6.3e6, 6.5e6)
 _AXIS = re.compile(r"(?:p|pos|position)?[\s_.]*([xyz])\b[\s_.]*(?:[\[(]?m[\])]?)?", re.I)
-
-
-def _bare_axes(raw: RawLog) -> list[str]:
-    """Return columns that are called x, y, z and may be coordinates; none unless all three."""
-    named = {m[1].lower(): name for name in raw.columns if (m := _AXIS.fullmatch(name.strip()))}
-    return [named[axis] for axis in "xyz"] if len(named) == 3 else []
 
 
 def _place(
@@ -189,10 +185,8 @@ def _place(
 def _height(found: dict[str, Found], values: Callable[[str], Array], raw: RawLog) -> Array:
     if "alt_msl" not in found or "geoid" not in found:
         return values(next(q for q in _HEIGHTS if q in found))
-    add_note(
-        raw.findings,
+    raw.note(
         "io.height-over-ellipsoid-over-sea",
-        file=raw.name,
         quantity="alt",
         source=found["alt_msl"].source,
         source_2=found["geoid"].source,
@@ -246,10 +240,8 @@ def _over_ground(
     never = not known.any()
     speed = np.where(known, speed, np.nan)
     angle, none = np.radians(course), np.full(speed.size, np.nan)
-    add_note(
-        raw.findings,
+    raw.note(
         "io.speed-and-course-never-known" if never else "io.velocity-by-speed-and-course",
-        file=raw.name,
         quantity=", ".join(VELOCITY),
         source=found["speed"].source,
         source_2=found["course"].source,
@@ -267,12 +259,8 @@ def _over_ground(
 def _sd_of_speed(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]) -> Array:
     """Return the accuracy of the speed as the standard deviation of each part of the velocity."""
     stated = values("speed_sd")
-    add_note(
-        raw.findings,
-        "io.velocity-sd-by-speed",
-        file=raw.name,
-        quantity=", ".join(VELOCITY_SD),
-        source=found["speed_sd"].source,
+    raw.note(
+        "io.velocity-sd-by-speed", quantity=", ".join(VELOCITY_SD), source=found["speed_sd"].source
     )
     return np.column_stack([np.where(stated > 0.0, stated, np.nan)] * 3)
 
@@ -342,10 +330,8 @@ def _accuracy(raw: RawLog, found: dict[str, Found], values: Callable[[str], Arra
         vertical = np.where(down > 0.0, down, np.nan)
     else:
         vertical = UNSTATED_VERTICAL * horizontal
-    add_note(
-        raw.findings,
+    raw.note(
         "io.sd-by-accuracy",
-        file=raw.name,
         quantity=", ".join(POSITION_SD),
         source=found["horizontal_accuracy"].source,
         unstated_vertical=None if "vertical_accuracy" in found else UNSTATED_VERTICAL,
@@ -376,10 +362,8 @@ def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
         by_date = [u for u in ("ms", "us", "ns") if _DATES[0] < first * TIME_UNITS[u] < _DATES[1]]
         unit = (fits or by_date or ["ms"])[0]
         if len(fits) == 1 and _DATES[0] < first * TIME_UNITS[unit] < _DATES[1]:
-            add_note(
-                raw.findings,
+            raw.note(
                 "io.time-unit-by-date",
-                file=raw.name,
                 quantity="time",
                 unit=unit,
                 year=1970.0 + np.floor(first * TIME_UNITS[unit] / 31556952.0),
@@ -408,13 +392,7 @@ def _quality(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array
     if not known.all():
         k = int(np.argmin(known))
         raise raw.fault("io.solution-kind-unknown", "Q", sample=k, codes=codes[k])
-    add_note(
-        raw.findings,
-        "io.column-taken-codes-rtklib-fix",
-        file=raw.name,
-        quantity="quality",
-        source=found["Q"].source,
-    )
+    raw.note("io.column-taken-codes-rtklib-fix", quantity="quality", source=found["Q"].source)
     return np.array([QUALITY[int(q)] for q in codes], dtype=np.float64)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding, add_note, add_warning
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import GPS, UNIX, WEEK, usual_step
@@ -96,14 +96,7 @@ def _of_monitors(
     """State the columns of each monitor; `gyro`: behind the name of one, its rates."""
     raw.stated, *raw.other_units = stated
     if len(names) > 1:
-        add_warning(
-            raw.findings,
-            "io.first-of-monitors",
-            file=raw.name,
-            quantity="gyro",
-            monitors=names,
-            other=f"{names[1]}{gyro}",
-        )
+        raw.warn("io.first-of-monitors", quantity="gyro", monitors=names, other=f"{names[1]}{gyro}")
     return raw
 
 

@@ -122,10 +122,8 @@ def _axes(columns: dict[str, NDArray[np.float64]], raw: RawLog) -> str | None:
         return None
     down = float(np.median(columns["dv_z"])) / step
     told = down < -0.5 * _GRAVITY[0]
-    add_warning(
-        raw.findings,
+    raw.warn(
         "io.taken-for-kf-gins" if told else "io.taken-for-kf-gins-axes-open",
-        file=raw.name,
         severity="note" if told else "warning",
         rate_hz=1.0 / step,
         down=down,
@@ -181,12 +179,10 @@ def fixes_of(raw: RawLog, names: tuple[str, ...]) -> Fixes:
     def block(first: int) -> np.ndarray:
         return np.column_stack([values[n] for n in names[first : first + 3]])
 
-    add_note(
-        raw.findings,
+    raw.note(
         "io.taken-for-kf-gins-fixes-with-velocity"
         if len(names) > len(NAMES)
         else "io.taken-for-kf-gins-fixes",
-        file=raw.name,
         count=len(names),
     )
     return Fixes(

@@ -14,6 +14,7 @@ velocity or direction.
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -106,16 +107,6 @@ def read(path: Path) -> RawLog:
     return raw
 
 
-def read_fixes(path: Path) -> RawLog:
-    """Read the fixes of the location; the height is over the geoid."""
-    return _read_stream(path, "gnss")
-
-
-def read_barometer(path: Path) -> RawLog:
-    """Read the pressure."""
-    return _read_stream(path, "barometer")
-
-
 def _read_stream(path: Path, stream: str) -> RawLog:
     members = _members(path)
     member = next((m for m in members if _stream_of(m) == stream), None)
@@ -133,6 +124,10 @@ def _read_stream(path: Path, stream: str) -> RawLog:
                 stated[column] = (quantity, unit)
     raw.stated, raw.clock = stated, RELATIVE
     return raw
+
+
+read_fixes = partial(_read_stream, stream="gnss")
+read_barometer = partial(_read_stream, stream="barometer")
 
 
 def _members(path: Path) -> list[Member]:
@@ -187,12 +182,7 @@ def _mention_linear(logs: list[RawLog]) -> list[RawLog]:
     wanted = {f"{triad}_{a}" for triad in _TRIADS for a in XYZ}
     for log in logs:
         if not any(q in wanted for q, _ in log.stated.values()):
-            add_warning(
-                log.findings,
-                "io.left-out-acceleration-without-gravity",
-                file=log.name,
-                quantity="accel",
-            )
+            log.warn("io.left-out-acceleration-without-gravity", quantity="accel")
     return logs
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.columns import parse_axes
 from strapdown.tables import SAMPLINGS
 
@@ -227,6 +227,14 @@ class RawLog:
         """Make an error of the file, or of one of its samples."""
         row = None if sample is None else self.row(sample)
         return DataError(code, file=self.name, row=row, quantity=quantity, **data)
+
+    def note(self, code: str, quantity: str | None = None, **data: Any) -> None:
+        """Add a note about the file."""
+        add_note(self.findings, code, file=self.name, quantity=quantity, **data)
+
+    def warn(self, code: str, quantity: str | None = None, **data: Any) -> None:
+        """Add a warning about the file."""
+        add_warning(self.findings, code, file=self.name, quantity=quantity, **data)
 
     def row(self, sample: int) -> int:
         """Row of a sample in the file, counted from 1."""

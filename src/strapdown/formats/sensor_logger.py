@@ -22,6 +22,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -119,21 +120,11 @@ def read(path: Path) -> RawLog:
     return raw
 
 
-def read_fixes(path: Path) -> RawLog:
-    """Read the fixes of ``Location``."""
-    return _read_stream(path, "gnss")
-
-
 def read_magnetometer(path: Path) -> RawLog:
     """Read the magnetic field at its own stamps, about the axes of the phone."""
     raw = _read_stream(path, "magnetometer")
     raw.axes = AXES
     return raw
-
-
-def read_barometer(path: Path) -> RawLog:
-    """Read the pressure."""
-    return _read_stream(path, "barometer")
 
 
 def _read_stream(path: Path, stream: str) -> RawLog:
@@ -149,6 +140,10 @@ def _read_stream(path: Path, stream: str) -> RawLog:
     there = [s for s, (k, _) in STREAMS.items() if set(k) & held]
     there += ["imu"] * bool(set(GYROS) & held)
     raise lacking(path, stream, TITLE, there)
+
+
+read_fixes = partial(_read_stream, stream="gnss")
+read_barometer = partial(_read_stream, stream="barometer")
 
 
 def _sensor(member: Member) -> str:
