@@ -34,8 +34,8 @@ from strapdown.formats.find_columns import (
     find_columns,
     names_of_fixes,
     reference,
-    require_gyro,
     steady_triads,
+    without_gyro,
 )
 from strapdown.formats.inference.conclusion import infer_accel
 from strapdown.formats.join import join
@@ -64,7 +64,7 @@ from strapdown.formats.triad_units import (
     values_of_triads,
 )
 from strapdown.formats.vocabularies import EULERS, QUATERNIONS
-from strapdown.tables import ACCEL, attitude_table, find_gaps, imu_of_columns
+from strapdown.tables import ACCEL, GYRO, attitude_table, find_gaps, imu_of_columns
 from strapdown.tables.checks import IMPOSSIBLE_FORCE, IMPOSSIBLE_RATE, all_finite
 from strapdown.tables.on_disk import filled, let_go, room, stored
 from strapdown.units import TIME_UNITS, factor_of, parse_unit
@@ -82,7 +82,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     """
     questions = Questions(raw.name)
     found = find_columns(raw, options, questions)
-    require_gyro(raw, found)
+    if missing := [q for q in GYRO if q not in found]:
+        raise without_gyro(raw, missing)
     if options.accel_unit is not None and not set(ACCEL) & set(found):
         _refuse_unit_of_nothing(raw, found, options.accel_unit)
     unused = _unused(raw, found)

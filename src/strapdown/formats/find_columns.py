@@ -119,15 +119,12 @@ def names_of_quantities(raw: RawLog) -> set[str]:
     return {str(read_name(name).quantity) for name in raw.columns}
 
 
-def require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
-    """Refuse a log without three rates; the message lists its columns."""
-    missing = [f"gyro_{a}" for a in AXES if f"gyro_{a}" not in found]
-    if not missing:
-        return
+def without_gyro(raw: RawLog, missing: list[str]) -> DataError:
+    """Make the error for a log without three rates; the message lists its columns."""
     if _is_nameless(raw):
-        raise DataError(_nameless(raw, {}))
+        return DataError(_nameless(raw, {}))
     left_out = [f for f in raw.findings if f.code.startswith("io.left-out")]
-    raise raw.fault(
+    return raw.fault(
         "io.no-gyro-columns-left-out" if left_out else "io.no-gyro-columns",
         missing=missing,
         columns=list(raw.columns) or ["none"],
@@ -388,7 +385,8 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
         if "rot" in one.family and letter & said.keys():
             said[name] = ColumnName(None)
     families = _families(raw, said)
-    _letter_g(raw, families, wanted, questions, found)
+    if ("gyro", "g") in families:
+        _letter_g(raw, families, wanted, questions, found)
     for triad in TRIADS:
         kept = _best({f: m for (t, f), m in families.items() if t == triad}, said)
         if not kept:
@@ -492,9 +490,9 @@ def _letter_g(
     Beside other rates they are gravity or acceleration in g: asked, if no other acceleration is
     there.
     """
-    own = families.get(("gyro", "g"))
-    units = {_unit_of(raw, name) for name in own.values()} if own else set()
-    if not own or units <= set(GYRO_UNITS) or set(own.values()) & set(wanted.values()):
+    own = families["gyro", "g"]
+    units = {_unit_of(raw, name) for name in own.values()}
+    if units <= set(GYRO_UNITS) or set(own.values()) & set(wanted.values()):
         return
     linear = [n for (t, _), m in families.items() if t == "accel" for n in m.values()]
     whole = [n for n in linear if not read_name(n).linear]

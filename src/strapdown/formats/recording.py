@@ -372,4 +372,5 @@ def stated_by(meta: Mapping[str, Any]) -> dict[str, Any]:
             stated["axes"] = "x,y,z" if parse_axes(text) == ([0, 1, 2], [1.0, 1.0, 1.0]) else text
     if checked:
         stated |= {"clock": meta.get("clock"), "epoch": float(meta.get("clock_origin_s", 0.0))}
-    return {**stated, "checked": checked, "calibrated": calibrated_in(meta.get("calibration"))}
+    by = calibrated_in(meta["calibration"]) if "calibration" in meta else None
+    return {**stated, "checked": checked, "calibrated": by}

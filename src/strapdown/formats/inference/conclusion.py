@@ -378,40 +378,29 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
     lasting = 0.01 if direction > 0.7 and len(norms) > 20 else 1.0
     # With gravity the motion of a hand or a car spreads the norm by a tenth.
     calm = float(np.exp(-spread / 0.12)) if len(norms) >= 5 else 0.1
-    weights: dict[tuple[str | None, str], float] = {}
-
-    def add(unit: str | None, form: str, prior: float, density: float) -> None:
-        weights[unit, form] = float(np.log(max(prior * density, 1e-300)))
-
+    # Prior and density of the norm, by unit and form.
+    models: dict[tuple[str | None, str], tuple[float, float]] = {}
     for unit, scale in SCALES.items():
         prior = _GRAVITY_PRIOR[unit] * (_WHOLE[unit] if whole else 1.0)
         off = (where - np.log10(STANDARD_GRAVITY / scale)) / sd
         # A cubic tail, for sensors that shake and turn more than the median spread shows.
         peak = 0.45 / sd / (1.0 + off * off / 3.0) ** 2
-        add(unit, "rate", prior * _PRIOR_FORM["rate"], calm * peak)
+        models[unit, "rate"] = prior * _PRIOR_FORM["rate"], calm * peak
         si = usual * scale
         broad = 0.25 * min(1.0, 10.0 / si) ** 2 * min(1.0, si / 1e-3)
         offset = broad * min(1.0, 0.3 / si) ** 3  # constant offset other than gravity
-        add(
-            unit,
-            "linear",
-            prior * _PRIOR_FORM["linear"],
-            swings * lasting * broad + (1.0 - swings) * offset,
-        )
+        still = swings * lasting * broad + (1.0 - swings) * offset
+        models[unit, "linear"] = prior * _PRIOR_FORM["linear"], still
         if step:
             off = (where - np.log10(STANDARD_GRAVITY * step / scale)) / sd
-            add(
-                unit,
-                "increment",
-                prior * _PRIOR_FORM["increment"],
-                calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2,
-            )
+            peak = calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2
+            models[unit, "increment"] = prior * _PRIOR_FORM["increment"], peak
     for k, count in enumerate(_COUNTS):
         off = (where - np.log10(count)) / sd
         prior = _PRIOR_COUNTS / len(_COUNTS) * (1.0 if whole else _BROKEN_COUNTS)
-        add(None, f"counts {k}", prior, calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2)
-    add(None, "other", _PRIOR_FORM["other"], (calm + swings) / _DECADES)
-    found = posterior(weights)
+        models[None, f"counts {k}"] = prior, calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2
+    models[None, "other"] = _PRIOR_FORM["other"], (calm + swings) / _DECADES
+    found = posterior({key: float(np.log(max(p * d, 1e-300))) for key, (p, d) in models.items()})
     units, forms = marginal(found, 0), marginal(found, 1)
     counted = math.fsum(p for f, p in forms.items() if str(f).startswith("counts"))
     forms["rate"] = forms.get("rate", 0.0) + counted
