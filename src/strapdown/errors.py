@@ -41,6 +41,8 @@ __all__ = [
     "Severity",
     "StrapdownError",
     "Words",
+    "add_note",
+    "add_warning",
     "check_choice",
     "nearest",
     "printable",
@@ -203,6 +205,16 @@ class Finding:
 
 def _remade(code: str, fields: dict[str, Any]) -> Finding:
     return Finding(code, **fields)
+
+
+def add_note(findings: list[Finding], code: str, **data: Any) -> None:
+    """Append a note; `data`: as `Finding`."""
+    findings.append(Finding(code, severity="note", **data))
+
+
+def add_warning(findings: list[Finding], code: str, **data: Any) -> None:
+    """Append a warning, unless `data` have another severity; `data`: as `Finding`."""
+    findings.append(Finding(code, **data))
 
 
 class StrapdownError(Exception):

@@ -18,17 +18,11 @@ from strapdown.errors import ConfigError
 from strapdown.formats import read_raw
 from strapdown.progress import Progress, silent
 from strapdown.report.outage import read_run_of_outage
-from strapdown.systems.alignment_run import AlignmentRun, run_alignment
+from strapdown.systems.alignment_run import AlignmentRun as AlignmentRun
+from strapdown.systems.alignment_run import run_alignment
 from strapdown.systems.inputs import NOWHERE, Memory
-from strapdown.systems.outage_run import OutageRun, run_outage
-
-__all__ = [
-    "AlignmentRun",
-    "OutageRun",
-    "align",
-    "outage",
-    "specify_alignment",
-]
+from strapdown.systems.outage_run import OutageRun as OutageRun
+from strapdown.systems.outage_run import run_outage
 
 
 def align(
@@ -65,10 +59,6 @@ def align(
         Filter applied to the samples first: ``{"kind": "robust_fir", "rate_hz": 100.0}``.
     progress : callable, optional
         Called with a stage and the completed fraction.
-
-    Returns
-    -------
-    AlignmentRun
 
     Raises
     ------
@@ -123,28 +113,10 @@ def specify_alignment(
 ) -> AlignmentSpec:
     """Build the specification of an alignment; its position may come from the log.
 
-    Parameters
-    ----------
-    log : ImuFile
-    site, sensor, fine
-        As `align`.
-    gnss : mapping, optional
-        The file of fixes, as the table ``gnss`` of a configuration.
-    coarse, prefilter : mapping
-        The module with its options, including ``kind``.
-    called : callable
-        Name of an argument in the interface, for messages: ``sensor`` as ``--sensor``.
-
-    Returns
-    -------
-    AlignmentSpec
-
-    Raises
-    ------
-    ConfigError
-        A required argument is missing; the message names it.
-    DataError
-        The log cannot be read.
+    `site`, `sensor`, `fine`: as `align`. `gnss`: the file of fixes, as the table ``gnss`` of a
+    configuration. `coarse`, `prefilter`: the module with its options, including ``kind``. `called`:
+    name of an argument in the interface, for messages: ``sensor`` as ``--sensor``. ConfigError: a
+    required argument is missing; the message names it. DataError: the log cannot be read.
     """
     if sensor is None:
         raise ConfigError("api.no-sensor-for-alignment", quantity=called("sensor"))
@@ -206,10 +178,6 @@ def outage(
         Tables and keys of the configuration: ``motion={"speed_m_per_s": 15.0}``,
         ``start={"heading_sd_deg": 1.0}``, ``aiding={"no_slip": {}}``; for a run ``places``,
         ``at_s``, ``from_s``, ``to_s``, ``duration_s``.
-
-    Returns
-    -------
-    OutageRun
 
     Raises
     ------

@@ -10,15 +10,14 @@ from strapdown.api.reading import ImuFile, imu_input, log_table
 from strapdown.config.logs import AllanSpec
 from strapdown.config.spec import specify
 from strapdown.progress import Progress, silent
-from strapdown.systems.allan_run import AllanRun, run_allan
+from strapdown.systems.allan_run import AllanRun as AllanRun
+from strapdown.systems.allan_run import run_allan
 from strapdown.systems.inputs import NOWHERE, Memory
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from strapdown.report.sensors import SensorsRun
-
-__all__ = ["AllanRun", "allan", "compare_sensors", "list_sensors"]
 
 
 def allan(

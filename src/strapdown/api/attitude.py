@@ -19,14 +19,16 @@ from strapdown.api.reading import ImuFile, imu_input, imu_of, imu_of_arrays
 from strapdown.attitude_algorithms import AttitudeTracker, attitude_history, make_algorithm
 from strapdown.attitude_algorithms.algorithm import history_of_samples
 from strapdown.attitude_comparison.comparison import (
-    AttitudeComparison,
+    AttitudeComparison as AttitudeComparison,
+)
+from strapdown.attitude_comparison.comparison import (
     initial_attitude,
     run_comparison,
 )
-from strapdown.attitude_comparison.options import AttitudeOptions
+from strapdown.attitude_comparison.options import AttitudeOptions as AttitudeOptions
 from strapdown.attitude_comparison.references import motion_finding
 from strapdown.attitude_comparison.source import magnetic_north
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.increments import BETWEEN_STAMPS, increments_from_imu
 from strapdown.orientation_filters import (
     FILTERS,
@@ -38,8 +40,12 @@ from strapdown.orientation_filters import (
 )
 from strapdown.progress import Progress, silent
 from strapdown.sensors.magnetometer import (
-    MagnetometerCalibration,
-    calibrate_magnetometer,
+    MagnetometerCalibration as MagnetometerCalibration,
+)
+from strapdown.sensors.magnetometer import (
+    calibrate_magnetometer as calibrate_magnetometer,
+)
+from strapdown.sensors.magnetometer import (
     without_iron,
 )
 from strapdown.sensors.rest import find_rests
@@ -50,17 +56,6 @@ from strapdown.tables.imu import imu_of_columns
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
-
-__all__ = [
-    "Attitude",
-    "AttitudeComparison",
-    "AttitudeOptions",
-    "MagnetometerCalibration",
-    "OrientationFilter",
-    "attitude",
-    "calibrate_magnetometer",
-    "compare_attitude",
-]
 
 Array = NDArray[np.float64]
 
@@ -352,7 +347,7 @@ def _filtered(
     felt = imu.reindex(columns=ACCEL).dropna()  # a filter refuses a log without them
     force = np.linalg.norm(felt.to_numpy(dtype=np.float64), axis=1)
     if force.size and not WEAKEST < (median := float(np.median(force))) < STRONGEST:
-        findings.append(Finding("attitude.no-gravity-in-force", quantity="accel", force=median))
+        add_warning(findings, "attitude.no-gravity-in-force", quantity="accel", force=median)
     if gyro_bias is not None:
         bias = _bias(gyro_bias, find_rests(imu) if isinstance(gyro_bias, str) else ())
         imu = imu.copy()
@@ -361,14 +356,7 @@ def _filtered(
     if chosen != asked:
         findings.append(motion_finding(chosen, imu))
     if run.disturbed >= REPORTED:
-        findings.append(
-            Finding(
-                "attitude.field-disturbed",
-                quantity=chosen.label,
-                severity="note",
-                share=run.disturbed,
-            )
-        )
+        add_note(findings, "attitude.field-disturbed", quantity=chosen.label, share=run.disturbed)
     out = Attitude(attitude_table(imu.index.to_numpy(), run.q_nb, source=name))
     sd = run.euler_sd()
     if sd is not None:
@@ -532,9 +520,7 @@ class OrientationFilter:
             force = self._force + _three(accel, "accel")
             roll, pitch = rotation.level(force / (self._samples + 1))
             tracker = AttitudeTracker(
-                self._algorithm,
-                rotation.quaternion_from_euler([roll, pitch, 0.0]),
-                self._sampling,
+                self._algorithm, rotation.quaternion_from_euler([roll, pitch, 0.0]), self._sampling
             )
             tracker.update(time, rate)
             self._force, self._tracker = force, tracker
@@ -599,10 +585,6 @@ def compare_attitude(
     **changes
         Fields of `AttitudeOptions` that replace those of `options`: ``rates_hz=[100, 50]``,
         ``tolerance_deg=0.5``, ``reference="end same as start"``.
-
-    Returns
-    -------
-    AttitudeComparison
 
     Raises
     ------

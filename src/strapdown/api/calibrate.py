@@ -14,10 +14,9 @@ from strapdown.config.logs import GRAVITY_RANGE, CalibrateSpec, KnownTurn, LogTa
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError, check_choice
 from strapdown.progress import Progress, silent
-from strapdown.systems.calibrate_run import CalibrateRun, run_calibrate
+from strapdown.systems.calibrate_run import CalibrateRun as CalibrateRun
+from strapdown.systems.calibrate_run import run_calibrate
 from strapdown.systems.inputs import NOWHERE, Memory
-
-__all__ = ["CalibrateRun", "calibrate", "turns_of"]
 
 WORD = re.compile(r"([xyz])?\s*([+-]?\d+(?:\.\d+)?)\s*(?:deg|°)?")
 

@@ -6,9 +6,8 @@ from pathlib import Path
 
 from strapdown.errors import ConfigError
 from strapdown.progress import Progress, silent
-from strapdown.report.compare import RunComparison, Saved, compare_results
-
-__all__ = ["RunComparison", "compare_runs"]
+from strapdown.report.compare import RunComparison as RunComparison
+from strapdown.report.compare import Saved, compare_results
 
 
 def compare_runs(*runs: str | Path | Saved, progress: Progress = silent) -> RunComparison:

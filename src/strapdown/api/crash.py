@@ -22,8 +22,6 @@ from strapdown.report.crash_case import CRASH
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = ["CrashRun", "reconstruct"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CrashRun(CaseResult):
@@ -173,10 +171,6 @@ def reconstruct(
         has it, too, and its crush in `CrashRun.deformation`.
     progress : callable, optional
         Called with a stage and the completed fraction.
-
-    Returns
-    -------
-    CrashRun
 
     Raises
     ------

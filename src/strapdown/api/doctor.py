@@ -14,10 +14,9 @@ from strapdown.config.logs import DoctorSpec, FixesTable
 from strapdown.config.spec import specify
 from strapdown.progress import Progress, silent
 from strapdown.systems.clean_log import write_clean_log
-from strapdown.systems.doctor import Diagnosis, run_doctor
+from strapdown.systems.doctor import Diagnosis as Diagnosis
+from strapdown.systems.doctor import run_doctor
 from strapdown.systems.inputs import NOWHERE, Memory
-
-__all__ = ["Diagnosis", "doctor"]
 
 
 def doctor(

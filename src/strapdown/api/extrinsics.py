@@ -10,14 +10,7 @@ from typing import Any
 import pandas as pd
 
 from strapdown.api.navigation import specify_navigation
-from strapdown.api.reading import (
-    ImuFile,
-    imu_input,
-    imu_of,
-    keys_in,
-    log_table,
-    table_input,
-)
+from strapdown.api.reading import ImuFile, imu_input, imu_of, keys_in, log_table, table_input
 from strapdown.api.stamps import by_time
 from strapdown.config.extrinsics import ExtrinsicsSpec
 from strapdown.config.logs import LogTable
@@ -27,11 +20,10 @@ from strapdown.errors import ConfigError, StrapdownError
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.progress import Progress, silent
-from strapdown.systems.extrinsics_run import ExtrinsicsRun, read_field, run_extrinsics
+from strapdown.systems.extrinsics_run import ExtrinsicsRun as ExtrinsicsRun
+from strapdown.systems.extrinsics_run import read_field, run_extrinsics
 from strapdown.systems.inputs import NOWHERE, Memory
 from strapdown.tables import GEODETIC, GYRO, MAG
-
-__all__ = ["ExtrinsicsRun", "extrinsics"]
 
 #: Before a drive: standard deviations of the antenna's lever arm, m, of the offset, s, and of the
 #: mounting, deg.

@@ -19,24 +19,8 @@ from strapdown.formats.gnss_fixes import POSITION_SDS
 from strapdown.progress import Progress, silent
 from strapdown.systems.inputs import NOWHERE, Memory
 from strapdown.systems.navigation_proposal import Proposal, propose
-from strapdown.systems.navigation_run import NavigationRun, run_navigation
-
-__all__ = [
-    "Barometer",
-    "BodyVelocity",
-    "Gnss",
-    "Heading",
-    "Magnetometer",
-    "Measurement",
-    "NavigationRun",
-    "NonHolonomic",
-    "Odometer",
-    "ZeroAngularRate",
-    "ZeroVelocity",
-    "navigate",
-    "specify_navigation",
-]
-
+from strapdown.systems.navigation_run import NavigationRun as NavigationRun
+from strapdown.systems.navigation_run import run_navigation
 
 # --- measurements -------------------------------------------------------------------------
 
@@ -205,10 +189,6 @@ def navigate(
     progress : callable, optional
         Called with a stage and the completed fraction.
 
-    Returns
-    -------
-    NavigationRun
-
     Raises
     ------
     ConfigError
@@ -263,26 +243,10 @@ def specify_navigation(
 ) -> NavigationSpec:
     """Build the specification of a run over a log, completed from the log and the fixes.
 
-    Parameters
-    ----------
-    log : ImuFile
-    aids : mapping of str to mapping
-        By name, the configuration table of each measurement.
-    sensor, start, options
-        As `navigate`.
-    called : callable
-        Name of an argument in the interface, for messages: ``sensor`` as ``--sensor``.
-
-    Returns
-    -------
-    NavigationSpec
-
-    Raises
-    ------
-    ConfigError
-        A required argument is missing; the message names it.
-    DataError
-        A file cannot be read.
+    `aids`: by name, the configuration table of each measurement. `sensor`, `start`, `options`: as
+    `navigate`. `called`: name of an argument in the interface, for messages: ``sensor`` as
+    ``--sensor``. ConfigError: a required argument is missing; the message names it. DataError: a
+    file cannot be read.
     """
     receiver = next((n for n, a in aids.items() if a["kind"] == "gnss" and a.get("path")), None)
     known = dict(start or {})

@@ -27,41 +27,21 @@ from strapdown.formats import holds
 from strapdown.formats.aid_table import read_stream
 from strapdown.formats.gnss_files import read_gnss as read_gnss_table
 from strapdown.formats.gnss_fixes import GnssOptions
-from strapdown.formats.recording import ABSENT
+from strapdown.formats.recording import ABSENT as ABSENT
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
 from strapdown.tables.checks import view_of
 
 if TYPE_CHECKING:
     from strapdown.config.logs import LogTable
 
-__all__ = [
-    "ABSENT",
-    "GnssFile",
-    "GnssFixes",
-    "Imu",
-    "ImuFile",
-    "Streams",
-    "imu_input",
-    "keys_in",
-    "log_in",
-    "read",
-    "read_gnss",
-    "read_imu",
-    "table_input",
-]
-
 
 @dataclass(frozen=True)
 class ImuFile:
     """A recorded log that has not been read yet, and its reading options.
 
-    Attributes
-    ----------
-    log : LogTable
-        Path, columns, units, sampling, and the part to use.
-    axes : str or None
-        Sensor axes that point forward, right, down (``x,-y,-z``), or directions of the sensor's x,
-        y and z axes (``forward-left-up``).
+    `log`: path, columns, units, sampling, and the part to use. `axes`: sensor axes that point
+    forward, right, down (``x,-y,-z``), or directions of the sensor's x, y and z axes
+    (``forward-left-up``).
     """
 
     log: LogTable
@@ -86,13 +66,7 @@ class ImuFile:
 
 @dataclass(frozen=True)
 class GnssFile:
-    """A file of fixes, and its reading options.
-
-    Attributes
-    ----------
-    path : str
-    options : GnssOptions
-    """
+    """A file of fixes, and its reading options."""
 
     path: str
     options: GnssOptions
@@ -154,10 +128,6 @@ class Imu(_Table):
         accel : array_like, (n, 3), m/s², optional
             Specific force, forward-right-down: about (0, 0, -9.8) at rest and level.
         sampling : {'instantaneous', 'mean'}
-
-        Returns
-        -------
-        Imu
 
         Raises
         ------
@@ -456,22 +426,9 @@ def log_table(log: ImuFile | pd.DataFrame, file: Path, stated: Mapping[str, Any]
 def imu_input(source: Any) -> ImuFile | pd.DataFrame:
     """Samples in any form as a file still to be read, or as a checked Imu table.
 
-    Parameters
-    ----------
-    source : str, Path, ImuFile, DataFrame, or (t, gyro, accel)
-        An unchanged Imu from `read_imu` is represented by its file. A DataFrame has the columns of
-        an Imu table, and its time in s as index or in a column ``time``.
-
-    Returns
-    -------
-    ImuFile or DataFrame
-
-    Raises
-    ------
-    DataError
-        A column is missing, or a value cannot be used.
-    ConfigError
-        The argument is none of these.
+    `source`: an unchanged Imu from `read_imu` is represented by its file. A DataFrame has the
+    columns of an Imu table, and its time in s as index or in a column ``time``. DataError: a column
+    is missing, or a value cannot be used. ConfigError: the argument is none of these.
     """
     if isinstance(source, ImuFile):
         return source
@@ -491,16 +448,7 @@ def imu_input(source: Any) -> ImuFile | pd.DataFrame:
 def table_input(data: Any, quantity: str) -> str | GnssFile | pd.DataFrame:
     """Source of a measurement: a path, a file with its options, or a table by time.
 
-    Parameters
-    ----------
-    data : str, Path or DataFrame
-    quantity : str
-        For messages.
-
-    Raises
-    ------
-    ConfigError
-        The argument is none of these.
+    `quantity`: for messages. ConfigError: the argument is none of these.
     """
     if isinstance(data, str | Path):
         return str(data)
@@ -530,10 +478,7 @@ def keys_in(data: str | GnssFile | pd.DataFrame, file: Path) -> dict[str, Any]:
 def imu_of(source: Any) -> pd.DataFrame:
     """Samples in any form as a checked Imu table; a file is read.
 
-    Parameters
-    ----------
-    source : object
-        As `imu_input`.
+    `source`: as `imu_input`.
     """
     given = imu_input(source)
     return given.read() if isinstance(given, ImuFile) else given
@@ -562,11 +507,7 @@ def _imu_of(source: pd.DataFrame) -> pd.DataFrame:
 
 
 def imu_of_arrays(
-    t: Any,
-    gyro: Any,
-    accel: Any = None,
-    sampling: str = "instantaneous",
-    source: str | None = None,
+    t: Any, gyro: Any, accel: Any = None, sampling: str = "instantaneous", source: str | None = None
 ) -> pd.DataFrame:
     """An Imu table from arrays, stored column by column like one that is read."""
     stamps, clock = seconds_of(t)

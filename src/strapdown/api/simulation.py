@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
     from strapdown.sensors.crash_unit import CrashUnit
 
-__all__ = ["Simulation", "simulate"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Simulation:
@@ -158,10 +156,6 @@ def simulate(
         and 0.1 m/s.
     recorders : sequence of str
         For a crash: names of its recorders, or ``all``.
-
-    Returns
-    -------
-    Simulation
 
     Raises
     ------

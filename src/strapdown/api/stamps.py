@@ -20,8 +20,6 @@ from strapdown.formats.clocks import UNIX
 from strapdown.formats.columns import read_name
 from strapdown.units import unit_of
 
-__all__ = ["as_frame", "by_time", "flat", "seconds_of"]
-
 #: Units of the columns of a table.
 SI = ("rad/s", "m/s2", "uT")
 

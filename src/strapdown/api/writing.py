@@ -17,7 +17,14 @@ from strapdown.api.reading import ImuFile, Streams
 from strapdown.bundle import read_manifest
 from strapdown.config.logs import FixesTable, LogTable
 from strapdown.config.spec import specify
-from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
+from strapdown.errors import (
+    ConfigError,
+    DataError,
+    Finding,
+    StrapdownError,
+    add_warning,
+    check_choice,
+)
 from strapdown.formats import STREAMS, open_stream
 from strapdown.formats.clocks import RELATIVE, Clock, clock_of, own_ns, read_stamps, with_clock
 from strapdown.formats.columns import parse_axes
@@ -28,8 +35,6 @@ from strapdown.formats.writers import FileOptions, find_writer, write_streams
 from strapdown.tables import GYRO, QUATERNION, attitude_table
 from strapdown.tables.checks import GEODETIC, MAG, POSITION_SD
 from strapdown.units import MAG_UNITS, PRESSURES, SPEEDS, TIME_UNITS, factor_of
-
-__all__ = ["read_streams", "write"]
 
 #: A column that identifies the stream of a table, in the order of the tests.
 _TELLS = (
@@ -139,10 +144,7 @@ def read_streams(
                     raise
                 else:
                     out = Finding(
-                        "api.stream-left-out",
-                        file=path.name,
-                        quantity=stream,
-                        reason=error.finding,
+                        "api.stream-left-out", file=path.name, quantity=stream, reason=error.finding
                     )
                     findings.append(out)
                 continue
@@ -280,7 +282,7 @@ def _cut(
             ns, ends = own_ns(table), own_ns(imu)
             keep = (ns >= ends[0]) & (ns <= ends[-1])
         else:
-            findings.append(Finding("io.stream-not-cut", quantity=name, stream=name))
+            add_warning(findings, "io.stream-not-cut", quantity=name, stream=name)
             keep = np.ones(len(table), dtype=bool)
         if not keep.any():
             raise ConfigError("io.stream-empty-part", quantity=name, stream=name)

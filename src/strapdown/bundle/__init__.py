@@ -27,7 +27,7 @@ from strapdown.bundle import atomic_folder
 from strapdown.bundle.atomic_folder import MANIFEST as MANIFEST
 from strapdown.bundle.atomic_folder import check_destination as check_destination
 from strapdown.bundle.atomic_folder import claimed as claimed
-from strapdown.errors import ConfigError, DataError, Finding, printable
+from strapdown.errors import ConfigError, DataError, Finding, add_warning, printable
 
 TIMING = "timing.json"
 LATENCY = "latency.json"
@@ -261,10 +261,7 @@ def write_bundle(
         digests.append(sha256(folder / MANIFEST))
 
     digests: list[str] = []
-    with (
-        claimed(out, force) as folder,
-        atomic_folder.written_whole(folder, seal) as staging,
-    ):
+    with claimed(out, force) as folder, atomic_folder.written_whole(folder, seal) as staging:
         yield staging
     seals.append(Seal(out.absolute(), *digests))
 
@@ -354,17 +351,7 @@ def _keep(
 # Dependencies of the results besides the inputs: packages and the platform.
 
 
-PACKAGES = (
-    "strapdown",
-    "numpy",
-    "scipy",
-    "numba",
-    "pandas",
-    "pyarrow",
-    "h5py",
-    "jinja2",
-    "typst",
-)
+PACKAGES = ("strapdown", "numpy", "scipy", "numba", "pandas", "pyarrow", "h5py", "jinja2", "typst")
 
 
 def versions() -> dict[str, str]:
@@ -552,25 +539,25 @@ def unsealed_changes(
     `manifest`: from `read_manifest`. `moved`: from `found_references`. Returns a finding per file:
     changed, missing, a link, or not in the manifest.
     """
-    changes = []
+    changes: list[Finding] = []
     items = {item["name"]: item for item in [*manifest["inputs"], *manifest["outputs"]]}
     for name, item in items.items():
         own = item.get("kept", "copy") == "copy"
         path = bundle / name if own else (moved or {}).get(name, Path(name))
         if own and _is_linked(bundle, name):
-            changes.append(Finding("bundle.a-link", file=name))
+            add_warning(changes, "bundle.a-link", file=name)
         elif not path.is_file():
-            changes.append(Finding("bundle.file-missing", file=name))
+            add_warning(changes, "bundle.file-missing", file=name)
         elif sha256(path) != item["sha256"]:
-            changes.append(Finding("bundle.file-changed", file=name))
+            add_warning(changes, "bundle.file-changed", file=name)
         elif path.stat().st_size != item["bytes"]:
-            changes.append(Finding("bundle.other-size", file=name, bytes=item["bytes"]))
+            add_warning(changes, "bundle.other-size", file=name, bytes=item["bytes"])
     for name in files_of(bundle):
         beside = name in (MANIFEST, *UNSEALED) or SIGNATURE_FILE.fullmatch(name)
         if beside and (bundle / name).is_symlink():
-            changes.append(Finding("bundle.a-link", file=name))
+            add_warning(changes, "bundle.a-link", file=name)
         elif not beside and name not in items:
-            changes.append(Finding("bundle.not-in-manifest", file=name))
+            add_warning(changes, "bundle.not-in-manifest", file=name)
     return changes
 
 
@@ -586,23 +573,10 @@ def _is_linked(bundle: Path, name: str) -> bool:
 def found_references(manifest: dict[str, Any], given: Sequence[Path]) -> dict[str, Path]:
     """Find the inputs that a bundle refers to, among the files and folders that the user allows.
 
-    Parameters
-    ----------
-    manifest : dict
-        From `read_manifest`.
-    given : sequence of Path
-        Files or folders. An input may have moved: a file is found by its digest, a folder takes the
-        place of the recorded one.
-
-    Returns
-    -------
-    dict of str to Path
-        From each recorded path, of files and of folders, to where it is now.
-
-    Raises
-    ------
-    ConfigError
-        An input is not covered by `given`: a manifest may name any file of this machine.
+    `manifest`: from `read_manifest`. `given`: files or folders. An input may have moved: a file is
+    found by its digest, a folder takes the place of the recorded one. From each recorded path, of
+    files and of folders, to where it is now. ConfigError: an input is not covered by `given`: a
+    manifest may name any file of this machine.
     """
     folders = [Path(p) for p in named_paths(manifest["configuration"])]
     found: dict[str, Path] = {}

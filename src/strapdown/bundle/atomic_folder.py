@@ -33,16 +33,6 @@ from typing import Any
 
 from strapdown.errors import ConfigError
 
-__all__ = [
-    "HeldError",
-    "check_destination",
-    "claimed",
-    "flush_entry",
-    "open_locked",
-    "replace_file",
-    "written_whole",
-]
-
 MANIFEST = "manifest.json"
 #: What a system promises differs; tests stand in for the others.
 WINDOWS, MACOS = os.name == "nt", sys.platform == "darwin"
@@ -90,10 +80,8 @@ def claimed(out: Path, force: bool = False) -> Iterator[Path]:
     Folders above it are created, and removed if they are empty at the end. A thread that holds
     the name may claim it again. Yields the destination with symbolic links resolved.
 
-    Raises
-    ------
-    ConfigError
-        Another run holds the name, its folder cannot be created, or as `check_destination`.
+    ConfigError: another run holds the name, its folder cannot be created, or as
+    `check_destination`.
     """
     out = Path(os.path.realpath(out))
     me = (threading.get_ident(),)

@@ -32,8 +32,6 @@ if TYPE_CHECKING:
         Ed25519PublicKey,
     )
 
-__all__ = ["Signature", "new_key", "sign", "signatures", "signer_of"]
-
 SCHEMA = "strapdown signature 1"
 _LARGEST = 10_000  # bytes of a file of a key or a signature
 

@@ -17,7 +17,14 @@ import numpy as np
 import pandas as pd
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
+from strapdown.errors import (
+    ConfigError,
+    DataError,
+    Finding,
+    StrapdownError,
+    add_warning,
+    check_choice,
+)
 from strapdown.formats import (
     android_events,
     ardupilot,
@@ -54,8 +61,7 @@ from strapdown.formats import (
 from strapdown.formats.assemble import assemble
 from strapdown.formats.find_columns import names_of_fixes, names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
-from strapdown.formats.instances import of_one_sensor
-from strapdown.formats.known_formats import or_sentences
+from strapdown.formats.known_formats import of_one_sensor
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
 from strapdown.formats.signs import HEAD, Signs, first_bytes, state_of
 from strapdown.formats.vocabularies import BODY_RATES
@@ -91,12 +97,11 @@ __all__ = [
 Raw = RawLog | Fixes | pd.DataFrame
 #: Names of streams, in the order in which they are shown.
 STREAMS = ("imu", "gnss", "reference", "magnetometer", "barometer", "wheel")
-#: Function of a module that reads each of them.
-_FUNCTIONS = dict(
-    zip(STREAMS, ("read", *(f"read_{s}" for s in ("fixes", *STREAMS[2:]))), strict=True)
-)
 #: In `Reader.streams`: one table of named columns, which hold any of `STREAMS`.
 TABLE = "table"
+#: Function of a module that reads each of them.
+_FUNCTIONS = {"imu": "read", "gnss": "read_fixes"}
+_FUNCTIONS |= {stream: f"read_{stream}" for stream in (*STREAMS[2:], TABLE)}
 
 
 @dataclass(frozen=True)
@@ -110,7 +115,8 @@ class Reader:
         Whether a file or folder is of this format: by its content, then by its name.
     streams : mapping of str to callable
         Reader of each stream that the format may hold, by a name of `STREAMS`, or of `TABLE`. It
-        raises `NoStreamError` if this file lacks the stream.
+        raises `NoStreamError` if this file lacks the stream, and otherwise `DataError` if the file
+        is damaged, or not as its format has it.
     files : callable, optional
         Every file that is read for a path; the path itself by default.
     parts : bool
@@ -126,12 +132,21 @@ class Reader:
     parts: bool = False
 
     @classmethod
-    def of(cls, module: ModuleType, title: str = "", parts: bool = False, name: str = "") -> Reader:
+    def of(
+        cls,
+        module: ModuleType,
+        title: str = "",
+        name: str = "",
+        *,
+        table: bool = False,
+        **more: Any,
+    ) -> Reader:
         """Make the reader of a module whose functions have the names of `_FUNCTIONS`.
 
         `title`: its ``TITLE`` if not given. Its ``files_of``, if there is one, lists the files.
         `name`: of one of several formats of a module, which is in the names of its functions:
-        ``detect_gpx``, ``read_gpx``, ``read_gpx_fixes``.
+        ``detect_gpx``, ``read_gpx``, ``read_gpx_fixes``. `table`: whether it may hold other streams
+        in the columns of a text table.
         """
         have, own = vars(module), f"_{name}" if name else ""
         streams = {
@@ -139,8 +154,10 @@ class Reader:
             for stream, plain in _FUNCTIONS.items()
             if (function := plain.replace("read", f"read{own}")) in have
         }
+        if table:
+            streams[TABLE] = csv.read
         known = title or have[f"{name.upper()}_TITLE" if name else "TITLE"]
-        return cls(known, have[f"detect{own}"], streams, have.get(f"files_of{own}"), parts)
+        return cls(known, have[f"detect{own}"], streams, have.get(f"files_of{own}"), **more)
 
 
 #: In the order of detection: formats of known recordings first, general formats last.
@@ -150,70 +167,30 @@ READERS: dict[str, Reader] = {
     "dataflash": Reader.of(ardupilot, name="dataflash"),
     "mavlink": Reader.of(ardupilot, name="mavlink"),
     "ros": Reader.of(ros, parts=True),
-    "novatel": Reader(
-        novatel.TITLE,
-        novatel.detect,
-        {
-            "imu": novatel.read,
-            "gnss": or_sentences(novatel.read_fixes),
-            "reference": novatel.read_reference,
-        },
-    ),
-    "sbf": Reader(
-        receivers.SBF_TITLE,
-        receivers.detect_sbf,
-        {"imu": receivers.read_sbf, "gnss": or_sentences(receivers.read_sbf_fixes)},
-    ),
-    "ubx": Reader(
-        receivers.UBX_TITLE,
-        receivers.detect_ubx,
-        {
-            "imu": receivers.read_ubx,
-            "gnss": or_sentences(receivers.read_ubx_fixes),
-            "reference": receivers.read_ubx_reference,
-            "wheel": receivers.read_ubx_wheel,
-        },
-    ),
+    "novatel": Reader.of(novatel),
+    "sbf": Reader.of(receivers, name="sbf"),
+    "ubx": Reader.of(receivers, name="ubx"),
     "mpu6050": Reader.of(data_sets, "folder of an MPU-6050 in MATLAB files", name="mpu"),
     "broad": Reader.of(data_sets, "BROAD trial, HDF5 with optical truth", name="broad"),
     "comma2k19": Reader.of(comma2k19, "comma2k19 segment, with its pose as truth"),
-    "kitti": Reader(
-        "KITTI raw, folder oxts",
-        kitti.detect,
-        {"imu": kitti.read, "gnss": kitti.read_fixes, "reference": kitti.read_trajectory},
-        kitti.files_of,
-    ),
+    "kitti": Reader.of(kitti, "KITTI raw, folder oxts"),
     "ronin": Reader.of(data_sets, "RoNIN, HDF5 of a phone", name="ronin"),
     "asl": Reader.of(asl, "EuRoC, TUM VI: data.csv of imu0, or folder mav0"),
-    "xsens": Reader(
-        "Xsens MT Manager export (.txt .csv)",
-        imu_makers.detect_xsens,
-        {"imu": imu_makers.read_xsens, TABLE: csv.read},
-    ),
+    "xsens": Reader.of(imu_makers, "Xsens MT Manager export (.txt .csv)", "xsens", table=True),
     "sensorstream": Reader.of(sensorstream, "Sensorstream IMU+GPS"),
     "sensor-logger": Reader.of(sensor_logger, "Sensor Logger: zip, folder, CSV, JSON"),
-    "sensorlog": Reader(
-        "SensorLog of iOS, wide CSV",
-        sensorlog.detect,
-        {"imu": sensorlog.read, "gnss": sensorlog.read_fixes, TABLE: csv.read},
-    ),
+    "sensorlog": Reader.of(sensorlog, "SensorLog of iOS, wide CSV", table=True),
     "core-motion": Reader.of(phone_apps, "table of Core Motion", name="core_motion"),
     "gnss-logger": Reader.of(gnss_logger, "GnssLogger of Android, device_imu.csv"),
-    "gsdc": Reader(
-        "Smartphone Decimeter Challenge, ground_truth.csv of 2021",
-        gnss_logger.detect_challenge,
-        {"gnss": gnss_logger.read_challenge},
+    "gsdc": Reader.of(
+        gnss_logger, "Smartphone Decimeter Challenge, ground_truth.csv of 2021", "challenge"
     ),
     "gsdc-raw": Reader(
         "Smartphone Decimeter Challenge, pseudoranges",
         gnss_logger.detect_pseudoranges,
         dict.fromkeys(("imu", "gnss", "reference"), gnss_logger.refuse_pseudoranges),
     ),
-    "smartloc": Reader(
-        "smartLoc, CSV of raw GNSS data",
-        data_sets.detect_smartloc,
-        {"gnss": data_sets.read_smartloc},
-    ),
+    "smartloc": Reader.of(data_sets, "smartLoc, CSV of raw GNSS data", "smartloc"),
     "racechrono": Reader.of(phone_apps, name="racechrono"),
     "vbo": Reader.of(loggers, name="vbo"),
     "flysight": Reader.of(loggers, name="flysight"),
@@ -233,36 +210,17 @@ READERS: dict[str, Reader] = {
     "gnss-ins-sim": Reader.of(toolboxes, name="gnss_ins_sim"),
     "gopro": Reader.of(gopro, "GoPro telemetry: GPMF, MP4, JSON"),
     "garmin-fit": Reader.of(tracks, "Garmin FIT (.fit)", name="fit"),
-    "gpx": Reader("GPX track (.gpx)", tracks.detect_gpx, {"gnss": tracks.read_gpx}),
-    "kml": Reader("KML track (.kml .kmz)", tracks.detect_kml, {"gnss": tracks.read_kml}),
-    "geojson": Reader(
-        "GeoJSON with times (.geojson .json)", tracks.detect_geojson, {"gnss": tracks.read_geojson}
-    ),
-    "dji-srt": Reader(
-        "subtitles of a DJI drone (.SRT)", tracks.detect_dji, {"gnss": tracks.read_dji}
-    ),
+    "gpx": Reader.of(tracks, "GPX track (.gpx)", "gpx"),
+    "kml": Reader.of(tracks, "KML track (.kml .kmz)", "kml"),
+    "geojson": Reader.of(tracks, "GeoJSON with times (.geojson .json)", "geojson"),
+    "dji-srt": Reader.of(tracks, "subtitles of a DJI drone (.SRT)", "dji"),
     "sensor-folder": Reader.of(sensor_folder, "folder or zip of one text table a sensor"),
     "android-events": Reader.of(android_events, "log of Android sensor events, one a row"),
-    "labview": Reader(
-        "measurement file of LabVIEW (.lvm)",
-        table_files.detect_labview,
-        {TABLE: table_files.read_labview},
-    ),
-    "json": Reader(
-        "JSON of samples: lines, list", table_files.detect_json, {TABLE: table_files.read_json}
-    ),
-    "excel": Reader(
-        "Excel workbook (.xlsx)", table_files.detect_excel, {TABLE: table_files.read_excel}
-    ),
-    "inertial-explorer": Reader(
-        novatel.EXPLORER_TITLE, novatel.detect_explorer, {"reference": novatel.read_explorer}
-    ),
-    "kitti-odometry": Reader(
-        kitti.ODOMETRY_TITLE,
-        kitti.detect_poses,
-        {"reference": kitti.read_poses},
-        kitti.files_of_poses,
-    ),
+    "labview": Reader.of(table_files, "measurement file of LabVIEW (.lvm)", "labview"),
+    "json": Reader.of(table_files, "JSON of samples: lines, list", "json"),
+    "excel": Reader.of(table_files, "Excel workbook (.xlsx)", "excel"),
+    "inertial-explorer": Reader.of(novatel, name="explorer"),
+    "kitti-odometry": Reader.of(kitti, name="odometry"),
     "tum": Reader(tum.TITLE, tum.detect, {"reference": tum.read}),
     "rtklib": Reader("solution of RTKLIB (.pos)", gnss_pos.detect, {"gnss": gnss_pos.read}),
     "nmea": Reader(
@@ -281,36 +239,13 @@ READERS: dict[str, Reader] = {
         kf_gins.detect_trajectory,
         {"reference": kf_gins.read_trajectory},
     ),
-    "kf-gins-folder": Reader(
-        kf_gins.FOLDER_TITLE,
-        kf_gins.detect_folder,
-        {
-            "imu": kf_gins.read_folder,
-            "gnss": kf_gins.read_folder_fixes,
-            "reference": kf_gins.read_folder_trajectory,
-        },
-        kf_gins.files_of_folder,
-    ),
+    "kf-gins-folder": Reader.of(kf_gins, name="folder"),
     "psins": Reader.of(toolboxes, "PSINS increments (.imu)", name="psins"),
-    "npy-folder": Reader(
-        "folder of NumPy arrays (.npy)",
-        table_files.detect_numpy_folder,
-        {TABLE: table_files.read_numpy_folder},
-    ),
+    "npy-folder": Reader.of(table_files, "folder of NumPy arrays (.npy)", "numpy_folder"),
     "csv": Reader("text table (.csv .txt .tsv .dat)", csv.detect, {TABLE: csv.read}),
-    "python-ins": Reader(
-        "python-ins arrays: imu, fix, truth (.npz)",
-        toolboxes.detect_python_ins,
-        {
-            "imu": toolboxes.read_python_ins,
-            "gnss": toolboxes.read_python_ins_fixes,
-            "reference": toolboxes.read_python_ins_truth,
-        },
-    ),
-    "sbet": Reader(receivers.SBET_TITLE, receivers.detect_sbet, {"reference": receivers.read_sbet}),
-    "npz": Reader(
-        "NumPy archive (.npz)", table_files.detect_numpy, {TABLE: table_files.read_numpy}
-    ),
+    "python-ins": Reader.of(toolboxes, "python-ins arrays: imu, fix, truth (.npz)", "python_ins"),
+    "sbet": Reader.of(receivers, name="sbet"),
+    "npz": Reader.of(table_files, "NumPy archive (.npz)", "numpy"),
     "parquet": Reader(
         "Parquet (.parquet .pq)", table_files.detect_parquet, {TABLE: table_files.read_parquet}
     ),
@@ -456,17 +391,9 @@ def read_raw(path: str | Path, form: str | None = None) -> RawLog:
 class Foreign:
     """A format that is known and not read.
 
-    Attributes
-    ----------
-    what : str
-    way : str
-        How its content gets in: program, or the export of the maker's program.
-    magics : tuple of bytes
-        First bytes; empty if the ending alone identifies the format.
-    suffixes : tuple of str
-        Endings; if `magics` are given, empty for any.
-    offset : int
-        Where the first bytes are.
+    `way`: how its content gets in: program, or the export of the maker's program. `magics`: first
+    bytes; empty if the ending alone identifies the format. `suffixes`: endings; if `magics` are
+    given, empty for any. `offset`: where the first bytes are.
     """
 
     what: str
@@ -637,12 +564,8 @@ def recording_of(raw: RawLog, asked: ReadOptions, *, keep: bool = True) -> Recor
         _refuse_other_table(raw)
     if raw.calibrated is not None and asked.calibration is not None:
         given = Path(str(asked.calibration)).name
-        raise DataError(
-            "calibrate.calibrated-twice",
-            file=raw.name,
-            quantity="calibration",
-            by=raw.calibrated,
-            calibration=given,
+        raise raw.fault(
+            "calibrate.calibrated-twice", "calibration", by=raw.calibrated, calibration=given
         )
     recording = assemble(raw, asked, keep=keep)
     return recording if asked.calibration is None else _calibrated(recording, asked)
@@ -664,20 +587,17 @@ def _calibrated(recording: Recording, asked: ReadOptions) -> Recording:
         warm = temperature_of(recording, recording.files[0], asked.format)
         warmth = None if warm is None else np.interp(imu.index, warm.index, warm)
     imu = known.apply(imu, warmth)
-    imu.attrs["calibrated"] = _mark_of(Path(str(asked.calibration)))
+    file = Path(str(asked.calibration))
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    # Name and SHA-256 identify the calibration in what is written.
+    imu.attrs["calibrated"] = f"{' '.join(file.name.split())}, sha256 {digest}"
     said = [*known.findings(recording.name, Path(str(asked.calibration)).name)]
     if known.not_observed:
         data = {"calibration": Path(str(asked.calibration)).name, "names": known.missing}
         code = "calibrate.applied-in-part"
-        said.append(Finding(code, severity="warning", file=recording.name, data=data))
+        add_warning(said, code, file=recording.name, data=data)
     said += _of_another_sensor(imu, known, recording.name, Path(str(asked.calibration)).name)
     return dataclasses.replace(recording, imu=imu, findings=(*recording.findings, *said))
-
-
-def _mark_of(path: Path) -> str:
-    """Name and SHA-256 of a calibration, which identify it in what is written."""
-    name = " ".join(path.name.split())
-    return f"{name}, sha256 {hashlib.sha256(path.read_bytes()).hexdigest()}"
 
 
 #: Rate, rad/s, and force beside gravity, m/s², of a calibrated sensor at rest, which it may have
@@ -724,4 +644,4 @@ def _refuse_other_table(raw: RawLog) -> None:
         code = "io.table-of-attitudes"
     else:
         return
-    raise DataError(code, file=raw.name, columns=list(raw.columns), name=raw.name)
+    raise raw.fault(code, columns=list(raw.columns), name=raw.name)

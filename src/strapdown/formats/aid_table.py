@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_note
 from strapdown.formats import csv, data_sets, holds, open_stream, read_raw, reader_of, table_files
 from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, on_clock_of, unrolled, with_clock
@@ -30,18 +30,6 @@ from strapdown.units import (
     SPEEDS,
     TIME_UNITS,
 )
-
-__all__ = [
-    "POINT",
-    "SYNONYMS",
-    "UNITS",
-    "along_body",
-    "read_aid_table",
-    "read_control_points",
-    "read_reference_path",
-    "read_stream",
-]
-
 
 Array = NDArray[np.float64]
 #: Unit of a table's column to the units accepted in a file, with their factors to it.
@@ -117,9 +105,8 @@ def read_aid_table(
     missing = [q for q in ("time", *columns) if q not in found and q not in optional]
     if missing:
         needed = [q for q in ("time", *columns) if q not in optional]
-        raise DataError(
+        raise raw.fault(
             "io.missing-columns",
-            file=raw.name,
             missing=missing,
             columns=list(raw.columns),
             needed=needed,
@@ -133,15 +120,7 @@ def read_aid_table(
     values = {name: found[name].values(raw, name) for name in there}
     for name, unit in columns.items():
         if name in values and UNITS[unit] and not found[name].stated:
-            findings.append(
-                Finding(
-                    "io.unit-assumed",
-                    file=raw.name,
-                    quantity=name,
-                    severity="note",
-                    unit=unit,
-                )
-            )
+            add_note(findings, "io.unit-assumed", file=raw.name, quantity=name, unit=unit)
     keep = _usable(raw, time, values, repair, findings)
     table = pd.DataFrame(
         {name: block[keep] for name, block in values.items()},
@@ -322,17 +301,12 @@ def _usable(
     _refuse_or_say(raw, "time", late, "io.aid-not-later", repair, findings)
     keep &= ~late
     if not keep.any():
-        raise DataError("io.no-usable-row", file=raw.name)
+        raise raw.fault("io.no-usable-row")
     return keep
 
 
 def _refuse_or_say(
-    raw: RawLog,
-    name: str,
-    bad: NDArray[np.bool_],
-    code: str,
-    repair: bool,
-    findings: list[Finding],
+    raw: RawLog, name: str, bad: NDArray[np.bool_], code: str, repair: bool, findings: list[Finding]
 ) -> None:
     rows = np.flatnonzero(bad)
     if not rows.size:
@@ -340,16 +314,7 @@ def _refuse_or_say(
     fault = Finding(code, file=raw.name, row=raw.row(int(rows[0])), quantity=name, count=rows.size)
     if not repair:
         raise DataError(fault)
-    findings.append(
-        Finding(
-            "io.left-out",
-            file=fault.file,
-            row=fault.row,
-            quantity=name,
-            severity="note",
-            reason=fault,
-        )
-    )
+    add_note(findings, "io.left-out", file=fault.file, row=fault.row, quantity=name, reason=fault)
 
 
 #: Columns, m.

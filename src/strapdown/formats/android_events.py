@@ -34,14 +34,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
 from strapdown.formats.columns import read_name, split_brackets
 from strapdown.formats.find_columns import LOOSEST, norm_and_spread
 from strapdown.formats.inference.conclusion import infer_accel
 from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.join import join
-from strapdown.formats.known_formats import force_of, sensor_log, split
+from strapdown.formats.known_formats import force_of, sensor_log
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 from strapdown.formats.triad_units import LIKELY
@@ -102,16 +102,12 @@ def _by_letters(rows: list[tuple[str, ...]]) -> dict[str, str]:
     return kinds if steady else {}
 
 
-def _has_layout(path: Path) -> bool:
-    """Whether a gyroscope and another sensor are among the kinds of the first rows."""
-    return csv.detect(path) and _layout(head(path, 1 << 16)) is not None
-
-
 detect = Signs(
     # A kind that is a gyroscope.
     text=r"\A[\s\S]{0,16000}?(?:(?i:gyr|rotation|angular)"
     r"|(?m:^|[,;\t |])[ \"']{0,3}(?:4|16|[gGwWrR])[ \"']{0,3}[,;\t |])",
-    also=_has_layout,
+    # A gyroscope and another sensor are among the kinds of the first rows.
+    also=lambda path: csv.detect(path) and _layout(head(path, 1 << 16)) is not None,
 )
 
 
@@ -121,7 +117,7 @@ def _layout(text: str) -> tuple[int, int, int, str | None, dict[str, str]] | Non
     if len(lines) < 3:
         return None
     separator = csv.separator_of(lines[1])
-    rows = [split(line, separator) for line in lines]
+    rows = [csv.fields_of(line, separator) for line in lines]
     header = rows[0] if len(rows[0]) >= 5 and not csv.are_data(rows[0][2:]) else []
     # An axis of a sensor is in the header of a table of samples.
     axes = ("gyro_", "accel_", "mag_", "rate_")
@@ -196,13 +192,7 @@ def _advance(stamps: list[float]) -> bool:
 
 
 def read(path: Path) -> RawLog:
-    """Read the gyro, with the other sensors interpolated to its stamps.
-
-    Raises
-    ------
-    DataError
-        A row has too few fields, or a value is not a number.
-    """
+    """Read the gyro, with the other sensors interpolated to its stamps."""
     text, findings = csv.decoded(path.read_bytes(), path.name)
     layout = _layout(text[: 1 << 16])
     if layout is None:
@@ -217,7 +207,7 @@ def read(path: Path) -> RawLog:
         if not line.strip() or csv.is_comment(line):
             continue
         separator = separator or csv.separator_of(line)
-        fields = split(line, separator)
+        fields = csv.fields_of(line, separator)
         which = None
         if len(fields) > kind:
             which = letters.get(fields[kind]) or kind_of(fields[kind])
@@ -226,9 +216,7 @@ def read(path: Path) -> RawLog:
             continue
         if len(fields) < first + 3:
             if row == len(lines) and not text.endswith("\n"):
-                findings.append(
-                    Finding("io.last-line-cut-left-out", file=path.name, row=row, severity="note")
-                )
+                add_note(findings, "io.last-line-cut-left-out", file=path.name, row=row)
                 continue
             raise DataError(
                 "io.fields-expected", file=path.name, row=row, count=len(fields), width=first + 3
@@ -237,9 +225,7 @@ def read(path: Path) -> RawLog:
         events.setdefault(which, []).append((row, fields[stamp], *fields[first : first + 3]))
     others = sorted(u for u in unknown if u and not read_name(u).quantity)[:6]
     if others:
-        findings.append(
-            Finding("io.events-not-used", file=path.name, severity="note", kinds=others)
-        )
+        add_note(findings, "io.events-not-used", file=path.name, kinds=others)
     columns = {k: _columns(path, k, rows) for k, rows in events.items()}
     android = any(
         (word := name.strip(" \"'").lower()).isdigit()
@@ -328,18 +314,14 @@ def joined(
         if kind is not None:
             logs.append(log(kind, triad))
             if kind != triad and triad == "gyro":
-                findings.append(
-                    Finding(
-                        "io.uncalibrated-gyro", file=path.name, quantity="gyro", severity="note"
-                    )
-                )
+                add_note(findings, "io.uncalibrated-gyro", file=path.name, quantity="gyro")
         elif triad == "accel" and {"linear", "gravity"} <= events.keys():
             logs.append(force_of(log("linear", "accel"), log("gravity", "accel")))
         elif triad == "accel" and "linear" in events and not android and _has_gravity(events):
             logs.append(log("linear", "accel"))
         elif triad == "accel" and "linear" in events:
-            findings.append(
-                Finding("io.left-out-without-gravity-no", file=path.name, quantity="accel")
+            add_warning(
+                findings, "io.left-out-without-gravity-no", file=path.name, quantity="accel"
             )
     for one in logs:
         one.stated = {c: (q, u or None) for c, (q, u) in one.stated.items()}

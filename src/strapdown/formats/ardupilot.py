@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats.clocks import RELATIVE, Clock
 from strapdown.formats.known_formats import Quantities, damage, interpolated, solution, turned
 from strapdown.formats.recording import NoStreamError, RawLog
@@ -165,7 +165,7 @@ def _log(path: Path, stream: str) -> tuple[dict[str, Record], Record, list[Findi
     if "TimeUS" not in log[name]:
         raise DataError("io.dataflash-without-stamps", file=path.name, quantity=f"{name} time")
     if lost:
-        findings.append(Finding("io.bytes-left-out", file=path.name, severity="note", count=lost))
+        add_note(findings, "io.bytes-left-out", file=path.name, count=lost)
     record = log[name]
     if "I" in record:
         first = int(record["I"].min())
@@ -217,7 +217,7 @@ def read_dataflash_fixes(path: Path) -> RawLog:
         if not use.all():
             count = int((~use).sum())
             code = "io.fixes-without-position-left-out"
-            findings.append(Finding(code, file=path.name, severity="note", count=count))
+            add_note(findings, code, file=path.name, count=count)
         if not use.any():
             raise DataError("io.no-usable-fix", file=path.name, quantity="lat, lon")
         fix = {n: v[use] for n, v in fix.items()}
@@ -348,33 +348,28 @@ UNKNOWN = 65535  # of a speed and a course
 Fields = dict[str, NDArray[Any]]
 
 
-def _begins(path: Path) -> bool:
-    """Whether there are two records, each a stamp of these decades and a frame."""
-    return len(list(mavlink_frames(first_bytes(path, 1024), most=2))) == 2
-
-
-detect_mavlink = Signs(first=rb"\A.{8,1023}?[\xfd\xfe]", also=_begins)
+detect_mavlink = Signs(
+    first=rb"\A.{8,1023}?[\xfd\xfe]",
+    # Two records, each a stamp of these decades and a frame.
+    also=lambda path: len(list(mavlink_frames(first_bytes(path, 1024), most=2))) == 2,
+)
 
 
 @lru_cache(maxsize=1)
 def _messages(path: Path, stamp: int) -> tuple[dict[str, Fields], list[Finding]]:
     """Read the fields of the messages of the vehicle, by their names."""
     read = parse("recorders.mavlink", path, wanted=list(IDS.items()))
-    findings = []
+    findings: list[Finding] = []
     if read["others"]:
-        findings.append(
-            Finding(
-                "io.mavlink-one-of-systems",
-                severity="note",
-                file=path.name,
-                system=read["system"],
-                others=read["others"],
-            )
+        add_note(
+            findings,
+            "io.mavlink-one-of-systems",
+            file=path.name,
+            system=read["system"],
+            others=read["others"],
         )
     if lost := read["lost"]:
-        findings.append(
-            Finding("io.mavlink-frames-left-out", severity="note", file=path.name, count=lost)
-        )
+        add_note(findings, "io.mavlink-frames-left-out", file=path.name, count=lost)
     return read["fields"], findings
 
 

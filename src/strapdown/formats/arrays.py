@@ -18,16 +18,6 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats.columns import read_name
 from strapdown.formats.recording import RawLog, stated_by
 
-__all__ = [
-    "day_nanoseconds",
-    "excel_nanoseconds",
-    "is_date",
-    "is_day_time",
-    "is_stamp",
-    "nanoseconds_of",
-    "told_by_file_rows",
-]
-
 _DATE = r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}"
 _STAMP = re.compile(
     rf"(?:(?P<date>{_DATE})(?:[T,]|[ T,] ?))?"
@@ -68,7 +58,8 @@ def is_date(field: object) -> bool:
 
 def is_stamp(field: str) -> bool:
     """Whether a field is a time of day, a date, or both."""
-    return _STAMP.fullmatch(_plain(field)) is not None or is_date(field)
+    plain = _plain(field)
+    return _STAMP.fullmatch(plain) is not None or _ONLY_DATE.fullmatch(plain) is not None
 
 
 def _plain(field: str) -> str:
@@ -232,10 +223,7 @@ RATES = ("sampling_rate", "sample_rate", "rate_hz", "fs", "freq", "frequency")
 
 
 def raw_log(
-    path: Path,
-    arrays: dict[str, NDArray[Any]],
-    units: dict[str, str],
-    meta: dict[str, Any],
+    path: Path, arrays: dict[str, NDArray[Any]], units: dict[str, str], meta: dict[str, Any]
 ) -> RawLog:
     """Convert named arrays to columns of one length.
 
@@ -258,7 +246,10 @@ def raw_log(
             file=path.name,
             arrays=", ".join([*arrays, *meta]) or "nothing",
         )
-    samples = _samples(columns)
+    # The length of the gyro's arrays, or else the most common length.
+    rates = [c.size for n, c in columns.items() if str(read_name(n).quantity).startswith("gyro")]
+    lengths = rates or [c.size for c in columns.values()]
+    samples = int(max(set(lengths), key=lengths.count))
     findings = _left_out(columns, samples, path.name)
     columns = {n: c for n, c in columns.items() if c.size == samples}
     return RawLog(
@@ -314,13 +305,6 @@ def _columns(name: str, array: NDArray[Any], stamps: Set[int]) -> dict[str, NDAr
     return {f"{name}[{k}]": np.ascontiguousarray(rows[:, k]) for k in range(rows.shape[1])}
 
 
-def _samples(columns: dict[str, NDArray[Any]]) -> int:
-    """Return the length of the gyro's arrays, or else the most common length."""
-    lengths = [c.size for n, c in columns.items() if str(read_name(n).quantity).startswith("gyro")]
-    lengths = lengths or [c.size for c in columns.values()]
-    return int(max(set(lengths), key=lengths.count))
-
-
 def _rate(meta: dict[str, Any]) -> float | None:
     """Return the stated sampling rate, given as a number or as text with its unit."""
     for key in RATES:
@@ -358,11 +342,10 @@ def numbers(raw: RawLog, source: str, quantity: str) -> NDArray[Any]:
     found = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=np.float64)
     bad = np.flatnonzero(np.isnan(found) & texts.notna().to_numpy())
     if bad.size:
-        raise DataError(
+        raise raw.fault(
             "io.value-not-a-number",
-            file=raw.name,
-            row=raw.row(int(bad[0])),
-            quantity=quantity,
+            quantity,
+            sample=int(bad[0]),
             values=values[bad[0]],
             source=source,
         )
@@ -413,13 +396,8 @@ def ticks_of(raw: RawLog, source: str, unit: str | None = None) -> tuple[NDArray
     found = nanoseconds_of(values)
     if found is None:
         first = next((k for k, v in enumerate(values) if nanoseconds_of([v]) is None), 0)
-        raise DataError(
-            "io.not-date-time-like-those",
-            file=raw.name,
-            row=raw.row(first),
-            quantity="time",
-            values=values[first],
-            source=source,
+        raise raw.fault(
+            "io.not-date-time-like-those", "time", sample=first, values=values[first], source=source
         )
     return found, True
 

@@ -20,17 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.columns import read_name
 from strapdown.formats.inference.conclusion import differenced
-from strapdown.formats.recording import (
-    RawLog,
-    TruthInSensorAxes,
-    calibrated_in,
-    calibrated_mark,
-)
+from strapdown.formats.recording import RawLog, TruthInSensorAxes, calibrated_in, calibrated_mark
 from strapdown.formats.sensor_folder import file_member, first_line
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.formats.tum import poses
@@ -66,40 +61,19 @@ LONGEST_STEP = 0.1  # s
 MOST_TILT = 15.0  # deg
 
 
-def _has_names(path: Path) -> bool:
-    return _is_imu(path) or _is_truth(path)
-
-
-def _has_tables(folder: Path) -> bool:
-    return _imu_of(folder) is not None or _truth_of(folder) is not None
-
-
 detect = Signs(
     suffixes=(".csv",),
     text=r"(?i)\A\s*+(?=.*timestamp)(?=.*(?:w_rs_s_x|q_rs_w))",
-    also=_has_names,
-    folder=_has_tables,
+    also=lambda path: _is_imu(path) or _is_truth(path),
+    folder=lambda path: _imu_of(path) is not None or _truth_of(path) is not None,
 )
 
 
 def read(path: Path) -> RawLog:
     """Read rates and specific force; from a folder, with the attitude truth beside them.
 
-    Parameters
-    ----------
-    path : Path
-        ``data.csv`` of a sensor or of a ground truth; or the folder ``mav0``, ``imu0``, or the
-        parent of ``mav0``.
-
-    Returns
-    -------
-    RawLog
-        For a ground truth alone, stamps and the attitude.
-
-    Raises
-    ------
-    DataError
-        A table is damaged.
+    `path`: ``data.csv`` of a sensor or of a ground truth; or the folder ``mav0``, ``imu0``, or the
+    parent of ``mav0``. For a ground truth alone, stamps and the attitude.
     """
     if path.is_dir():
         return _folder(path)
@@ -151,7 +125,7 @@ def _stated(raw: RawLog, known: dict[str, str]) -> RawLog:
     missing = {"time", *known.values()} - {quantity for quantity, _ in stated.values()}
     if missing:
         names = ", ".join(raw.columns)
-        raise DataError("io.no-column-4", file=raw.name, missing=sorted(missing), columns=names)
+        raise raw.fault("io.no-column-4", missing=sorted(missing), columns=names)
     return dataclasses.replace(raw, stated=stated)
 
 
@@ -247,32 +221,25 @@ def _with(raw: RawLog, q_ns: Array, known: RawLog) -> RawLog:
         mean = rotation.rotate(q_ns[at], force[at]).mean(axis=0)
         tilt = float(np.degrees(np.arctan2(np.hypot(mean[0], mean[1]), -mean[2])))
     if not tilt <= MOST_TILT:
-        findings.append(
-            Finding(
-                "io.left-out-attitude-leans" if at.any() else "io.left-out-attitude-far",
-                file=known.name,
-                quantity="attitude",
-                severity="note",
-                tilt_deg=tilt,
-            )
-        )
-        return dataclasses.replace(raw, findings=findings)
-    findings.append(
-        Finding(
-            "io.interpolated-samples-specific-force-average",
+        add_note(
+            findings,
+            "io.left-out-attitude-leans" if at.any() else "io.left-out-attitude-far",
             file=known.name,
             quantity="attitude",
-            severity="note",
-            at=int(at.sum()),
-            size=at.size,
-            tilt=tilt,
+            tilt_deg=tilt,
         )
+        return dataclasses.replace(raw, findings=findings)
+    add_note(
+        findings,
+        "io.interpolated-samples-specific-force-average",
+        file=known.name,
+        quantity="attitude",
+        at=int(at.sum()),
+        size=at.size,
+        tilt=tilt,
     )
     return dataclasses.replace(
-        raw,
-        truth=TruthInSensorAxes(q_ns, at),
-        files=(*raw.files, *known.files),
-        findings=findings,
+        raw, truth=TruthInSensorAxes(q_ns, at), files=(*raw.files, *known.files), findings=findings
     )
 
 

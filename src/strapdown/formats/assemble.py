@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_warning
 from strapdown.formats.arrays import as_rows, numbers, ticks_of
 from strapdown.formats.clocks import (
     RELATIVE,
     Clock,
-    EvenStamps,
     Stamps,
     clock_of_name,
     counted,
@@ -28,7 +27,6 @@ from strapdown.formats.clocks import (
     with_clock,
 )
 from strapdown.formats.columns import parse_axes, read_name
-from strapdown.formats.crash_record import IMPOSSIBLE_FORCE, IMPOSSIBLE_RATE
 from strapdown.formats.find_columns import (
     AXES,
     Column,
@@ -36,10 +34,10 @@ from strapdown.formats.find_columns import (
     find_columns,
     names_of_fixes,
     reference,
-    require_gyro,
     steady_triads,
+    without_gyro,
 )
-from strapdown.formats.inference.conclusion import Inference, infer_accel
+from strapdown.formats.inference.conclusion import infer_accel
 from strapdown.formats.join import join
 from strapdown.formats.recording import (
     AXES_OF_SENSOR,
@@ -54,33 +52,22 @@ from strapdown.formats.triad_units import (
     LIKELY,
     SUMS,
     UNITS,
-    Axes,
+    LogInUse,
     axes_matrix,
     body_axes,
     intervals,
     mirrored,
-    sampling_of_sums,
+    sampling_of,
     told_by_numbers,
     unit_of_counts,
     units_of_triads,
     values_of_triads,
 )
 from strapdown.formats.vocabularies import EULERS, QUATERNIONS
-from strapdown.tables import ACCEL, SAMPLINGS, attitude_table, find_gaps, imu_of_columns
-from strapdown.tables.checks import all_finite
+from strapdown.tables import ACCEL, GYRO, attitude_table, find_gaps, imu_of_columns
+from strapdown.tables.checks import IMPOSSIBLE_FORCE, IMPOSSIBLE_RATE, all_finite
 from strapdown.tables.on_disk import filled, let_go, room, stored
 from strapdown.units import TIME_UNITS, factor_of, parse_unit
-
-__all__ = [
-    "assemble",
-    "clock_of_log",
-    "finite_rows",
-    "require_accel",
-    "sampling_of_rates",
-    "stamps_of_log",
-    "time_reading",
-]
-
 
 Array = NDArray[np.float64]
 
@@ -95,8 +82,10 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     """
     questions = Questions(raw.name)
     found = find_columns(raw, options, questions)
-    require_gyro(raw, found)
-    _refuse_unit_of_nothing(raw, found, options)
+    if missing := [q for q in GYRO if q not in found]:
+        raise without_gyro(raw, missing)
+    if options.accel_unit is not None and not set(ACCEL) & set(found):
+        _refuse_unit_of_nothing(raw, found, options.accel_unit)
     unused = _unused(raw, found)
     if parts := _by_sensor(raw, found):
         raw = dataclasses.replace(
@@ -110,26 +99,27 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     findings = [*raw.findings, *unused]
     if found["gyro_x"].source not in raw.stated:
         findings = [f for f in findings if f.code != "io.first-of-monitors"]
-    values = values_of_triads(raw, found, findings)
+    log = LogInUse(raw, options, questions, found, findings)
+    values = log.values = values_of_triads(log)
     if not keep:
-        _take_memory(raw, found, values)
+        _take_memory(log)
     let_go(values["gyro"])
     ticks, dated = (
         ticks_of(raw, found["time"].source, found["time"].unit)
         if "time" in found
         else (None, False)
     )
-    shared = None if ticks is None or _written_twice(ticks, values) else ticks
-    even = None if shared is None else even_stamps(shared)
-    bursts = None if shared is None or even is not None else spread_bursts(shared)
-    ticks = even.ticks if even is not None else bursts.ticks if bursts is not None else ticks
-    said = told_by_numbers(raw, found, options, values, ticks, dated)
+    even = None
+    if ticks is not None and not _written_twice(ticks, values):
+        even = even_stamps(ticks) or spread_bursts(ticks)
+        ticks = ticks if even is None else even.ticks
+    log.said = told_by_numbers(log, ticks, dated)
     let_go(values["gyro"])
-    axes = body_axes(raw, options, said, findings)
-    units = units_of_triads(raw, found, options, values, said, findings, questions)
-    values = {t: values[t] for t in units}
+    axes = body_axes(log)
+    units = units_of_triads(log)
+    values = log.values = {t: values[t] for t in units}
     try:
-        finite = finite_rows(raw, found, ticks, values, options, findings)
+        finite = _finite_rows(log, ticks)
     except DataError as error:
         if error.finding.code not in REPAIRABLE:
             raise
@@ -138,7 +128,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         raise
     let_go(values["gyro"])
     try:
-        stamps = stamps_of_log(raw, found, ticks, dated, options, finite, said, findings)
+        stamps = _stamps_of_log(log, ticks, dated, finite)
     except DataError as error:
         code, choices = error.finding.code, error.finding.data.get("choices")
         if code in REPAIRABLE:
@@ -148,8 +138,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
             unit = str(best["unit"]) if best["share"] >= LIKELY else "UNIT"
             questions.ask(error.finding, time_unit=unit)
         elif code == "io.time-column-missing":
-            clock = _likely_clock(raw, found)
-            questions.ask(error.finding, **({"time": clock} if clock else {"rate": "HZ"}))
+            name = _likely_clock(raw, found)
+            questions.ask(error.finding, **({"time": name} if name else {"rate": "HZ"}))
         else:
             questions.refuse()
             raise
@@ -162,46 +152,34 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         kept = stored(np.flatnonzero(finite)[stamps.keep])
         time = stored(stamps.seconds, np.flatnonzero(stamps.keep))
     if time.size < 2:
-        raise DataError(
-            "io.too-few-samples",
-            file=raw.name,
-            quantity="time",
-            size=time.size,
-        )
+        raise raw.fault("io.too-few-samples", "time", size=time.size)
     # A median of steps is at most twice their mean.
     faster = 2.0 * (time[-1] - time[0]) <= SLOWEST * (time.size - 1)
     slow = 0.0 if faster else float(np.median(np.diff(time)))
     if slow > SLOWEST and options.time_unit is None and options.rate is None:
-        raise DataError(
+        raise raw.fault(
             "io.too-slow-for-a-gyro",
-            file=raw.name,
-            quantity="time",
+            "time",
             size=time.size,
             length=time[-1] - time[0],
             step=slow,
             unit=stamps.unit,
         )
     if even is not None:
-        findings.append(_said_of_coarse(raw, even, TIME_UNITS[stamps.unit]))
-    if bursts is not None:
         factor = TIME_UNITS[stamps.unit]
-        findings.append(
-            Finding(
-                "io.stamps-shared-by-bursts",
-                file=raw.name,
-                quantity="time",
-                size=bursts.size,
-                rate_hz=1.0 / (bursts.step * factor),
-                spread=bursts.spread * factor,
-                interval=bursts.size * bursts.step * factor,
-            )
-        )
-    readings = [time_reading(raw, found, stamps, int(kept[0]))]
+        findings.append(even.finding(factor, file=raw.name, quantity="time"))
+    clock, of_time = _clock_of_log(log, stamps, dated, int(kept[0]))
+    readings = [of_time]
     body, block = _block(values, units, kept.size, keep)
-    summed = {t for t, (unit, _) in units.items() if unit in SUMS[t]}
     begins = {triad: values[triad][kept[0]].copy() for triad in units}
     factors = {t: factor_of(unit, {**UNITS[t], **SUMS[t]}) for t, (unit, _) in units.items()}
-    changed = [t for t in units if not _are_body(values[t], axes, factors[t], body[t])]
+    as_they_are = (axes.axis, axes.sign) == AS_THEY_ARE
+    changed = [  # a triad may be where its body axes go, and already in these and in SI units
+        t
+        for t in units
+        if not (as_they_are and factors[t] == 1.0)
+        or values[t].__array_interface__ != body[t].__array_interface__
+    ]
     for begin in range(0, kept.size if changed else 0, AT_ONCE):
         rows = slice(begin, begin + AT_ONCE)
         used = {
@@ -210,24 +188,29 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
             for triad in changed
         }
         for triad in changed:
-            _turn(used[triad], axes, factors[triad], body[triad][rows])
+            for j, (axis, sign) in enumerate(zip(axes.axis, axes.sign, strict=True)):
+                with np.errstate(over="ignore"):  # what is no force or rate is refused below
+                    sensed = used[triad][:, axis]
+                    np.multiply(sensed, sign * factors[triad], out=body[triad][rows, j])
             let_go(values[triad])
         let_go(block)
         let_go(kept)
     del values
-    for triad in units:
-        if triad in summed:
+    log.values = {}
+    for triad, (unit, why) in units.items():
+        if unit in SUMS[triad]:
             body[triad] /= intervals(time, kept)
-        readings += _readings_of_triad(found, triad, axes, units[triad], begins[triad])
-    if summed:
-        sampling = sampling_of_sums(summed, set(units), options.sampling, raw.name, findings)
-    else:
-        sampling = sampling_of_rates(raw, options, findings)
-    report_gaps(raw.name, time, body["gyro"], findings)
-    _refuse_impossible(raw.name, body, lambda k: raw.row(int(kept[k])))
-    report_absurd(raw.name, body["gyro"], lambda k: raw.row(int(kept[k])), findings)
+        for j, (axis, sign) in enumerate(zip(axes.axis, axes.sign, strict=True)):
+            column = found[f"{triad}_{AXES[axis]}"]
+            to = ("-" if sign < 0 else "") + f"{triad}_{AXES[j]}"
+            because = f"{column.why}; unit {why}; axes {axes.why}"
+            first = float(begins[triad][axis])
+            readings.append(Reading(column.source, to, unit, because, first))
+    sampling = sampling_of(log, units)
+    _report_gaps(log, time, body["gyro"])
+    _report_beyond_limits(log, body, kept)
     let_go(block)
-    report_weightless(raw.name, body.get("accel"), findings)
+    _report_weightless(log, body.get("accel"))
     columns = [f"{triad}_{a}" for triad in units for a in AXES]
     sparse = any(not all_finite(body[triad]) for triad in raw.sparse if triad in body)
     imu = imu_of_columns(time, block, columns, sampling=sampling, source=raw.name, sparse=sparse)
@@ -237,14 +220,14 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         ("-" if sign < 0 else "") + AXES[axis]
         for axis, sign in zip(axes.axis, axes.sign, strict=True)
     )
-    with_clock(imu, clock_of_log(raw, found, stamps, dated))
+    with_clock(imu, clock)
     if raw.epoch == 0.0:
         imu.attrs["clock_origin_stamp"] = (stamps.origin.stamp, stamps.origin.unit)
     if raw.calibrated is not None:
         imu.attrs["calibrated"] = raw.calibrated
-    first, last = raw.row(int(kept[0])), raw.row(int(kept[-1]))
-    imu.attrs["first_row"] = first if last - first == len(kept) - 1 else None
-    truth, scored = truth_of_log(raw, found, time, kept, (axes.axis, axes.sign), readings, findings)
+    first_row, last_row = raw.row(int(kept[0])), raw.row(int(kept[-1]))
+    imu.attrs["first_row"] = first_row if last_row - first_row == len(kept) - 1 else None
+    truth, scored = _truth_of_log(log, time, kept, (axes.axis, axes.sign), readings)
     return Recording(
         name=raw.name,
         files=raw.files,
@@ -253,7 +236,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         truth=truth,
         scored=scored,
         readings=tuple(readings),
-        findings=tuple(findings),
+        findings=tuple(log.findings),
         start=raw.start,
         temperature=_temperature(raw, time, kept),
     )
@@ -281,13 +264,12 @@ def _temperature(raw: RawLog, time: Array, kept: NDArray[np.int64]) -> pd.Series
     return None
 
 
-def _take_memory(raw: RawLog, found: dict[str, Column], values: Mapping[str, Array]) -> None:
+def _take_memory(log: LogInUse) -> None:
     """Put the columns of triads that were copied in place of those of the log."""
-    for triad, block in values.items():
-        for axis, column in zip(AXES, block.T, strict=True):
-            source = found[f"{triad}_{axis}"].source
-            if raw.columns[source].dtype == column.dtype:
-                raw.columns[source] = column
+    for triad, block in log.values.items():
+        for column, values in zip(log.columns(triad), block.T, strict=True):
+            if log.raw.columns[column.source].dtype == values.dtype:
+                log.raw.columns[column.source] = values
 
 
 def _written_twice(ticks: NDArray[Any], values: Mapping[str, Array]) -> bool:
@@ -299,18 +281,6 @@ def _written_twice(ticks: NDArray[Any], values: Mapping[str, Array]) -> bool:
         return False
     same = [np.all(v[again] == v[again + 1], axis=1) for v in values.values()]
     return bool(np.all(same, axis=0).mean() > 0.5)
-
-
-def _said_of_coarse(raw: RawLog, even: EvenStamps, factor: float) -> Finding:
-    return Finding(
-        "io.stamps-spread-evenly",
-        file=raw.name,
-        quantity="time",
-        tick=even.tick * factor,
-        rate=1.0 / (even.step * factor),
-        rate_within=even.tick / (even.step**2 * max(even.ticks.size - 1, 1) * factor),
-        off=even.off * factor,
-    )
 
 
 def _likely_clock(raw: RawLog, found: dict[str, Column]) -> str:
@@ -363,29 +333,15 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
         forces = [n for n in names if read_name(n).quantity in ACCEL]
         if {read_name(n).quantity for n in forces} == set(ACCEL):
             named = {read_name(n).quantity: n for n in reversed(forces)}
-            out.append(
-                Finding(
-                    "io.accelerometer-not-read",
-                    file=raw.name,
-                    quantity="accel",
-                    names=forces,
-                    **_as_accelerometer(raw, [named[q] for q in ACCEL]),
-                )
-            )
+            likely = _as_accelerometer(raw, [named[q] for q in ACCEL])
+            code = "io.accelerometer-not-read"
+            add_warning(out, code, file=raw.name, quantity="accel", names=forces, **likely)
         elif not forces:
-            out += [_like_gravity(raw, three, norm) for three, norm in steady_triads(raw, names)]
+            for three, norm in steady_triads(raw, names):
+                data = {"names": three, "norm": norm, **_as_accelerometer(raw, three)}
+                code = "io.columns-like-accelerometer"
+                add_warning(out, code, file=raw.name, quantity="accel", data=data)
     return out
-
-
-def _like_gravity(raw: RawLog, three: list[str], norm: float) -> Finding:
-    return Finding(
-        "io.columns-like-accelerometer",
-        file=raw.name,
-        quantity="accel",
-        names=three,
-        norm=norm,
-        **_as_accelerometer(raw, three),
-    )
 
 
 def _as_accelerometer(raw: RawLog, three: list[str]) -> dict[str, Any]:
@@ -401,13 +357,12 @@ def _as_accelerometer(raw: RawLog, three: list[str]) -> dict[str, Any]:
     return {"columns": ",".join(columns), "unit": str(unit or "UNIT")}
 
 
-def _refuse_unit_of_nothing(raw: RawLog, found: dict[str, Column], options: ReadOptions) -> None:
+def _refuse_unit_of_nothing(raw: RawLog, found: dict[str, Column], unit: str) -> None:
     """Refuse a unit that the user states for an accelerometer of which there is no column.
 
     A reader that left the accelerometer out has said so.
     """
-    left_out = any(f.quantity == "accel" for f in raw.findings)
-    if options.accel_unit is None or set(ACCEL) & set(found) or left_out:
+    if any(f.quantity == "accel" for f in raw.findings):
         return
     used = {column.source for column in found.values()}
     names = [name for name in raw.columns if name and name not in used]
@@ -416,9 +371,9 @@ def _refuse_unit_of_nothing(raw: RawLog, found: dict[str, Column], options: Read
         "io.unit-without-column",
         file=raw.name,
         quantity="--accel-unit",
-        unit=options.accel_unit,
+        unit=unit,
         names=names or ["none"],
-        columns=_like_gravity(raw, *likely).data["columns"]
+        columns=_as_accelerometer(raw, likely[0])["columns"]
         if likely
         else ",".join(f"accel_{a}=NAME" for a in AXES),
     )
@@ -525,100 +480,41 @@ def _block(
     return {triad: block[:, 3 * k : 3 * k + 3] for k, triad in enumerate(names)}, block
 
 
-def _are_body(values: Array, axes: Axes, factor: float, body: Array) -> bool:
-    """Whether a triad is where its body axes go, and already in these and in SI units."""
-    same = values.__array_interface__ == body.__array_interface__
-    return same and factor == 1.0 and (axes.axis, axes.sign) == AS_THEY_ARE
-
-
-def _turn(values: Array, axes: Axes, factor: float, body: Array) -> None:
-    """Write samples of a triad in body axes and SI units to `body`."""
-    for j, (axis, sign) in enumerate(zip(axes.axis, axes.sign, strict=True)):
-        with np.errstate(over="ignore"):  # what is no force or rate is refused below
-            np.multiply(values[:, axis], sign * factor, out=body[:, j])
-
-
-def _readings_of_triad(
-    found: dict[str, Column], triad: str, axes: Axes, unit: tuple[str, str], first: Array
-) -> list[Reading]:
-    """List how the columns of a triad were read, one reading per body axis."""
-    readings = []
-    for j, (axis, sign) in enumerate(zip(axes.axis, axes.sign, strict=True)):
-        column = found[f"{triad}_{AXES[axis]}"]
-        readings.append(
-            Reading(
-                column.source,
-                ("-" if sign < 0 else "") + f"{triad}_{AXES[j]}",
-                unit[0],
-                f"{column.why}; unit {unit[1]}; axes {axes.why}",
-                float(first[axis]),
-            )
-        )
-    return readings
-
-
-def stamps_of_log(
-    raw: RawLog,
-    found: dict[str, Column],
-    ticks: NDArray[Any] | None,
-    dated: bool,
-    options: ReadOptions,
-    finite: NDArray[np.bool_],
-    said: dict[str, Inference],
-    findings: list[Finding],
+def _stamps_of_log(
+    log: LogInUse, ticks: NDArray[Any] | None, dated: bool, finite: NDArray[np.bool_]
 ) -> Stamps:
-    """Convert the stamps of the finite rows to seconds.
+    """Convert the stamps of the finite rows to seconds; inferences and repairs are reported.
 
     `ticks` ((n,)): stamps as in the file. `dated`: whether they were dates, now converted to ns.
-    `finite` ((n,)): from `finite_rows`. `said`: inferences from the numbers. `findings`: inferences
-    and repairs are appended. DataError: time is missing, or cannot be used. ConfigError: the stated
-    rate is invalid.
+    `finite` ((n,)): from `_finite_rows`. DataError: time is missing, or cannot be used.
+    ConfigError: the stated rate is invalid.
     """
+    raw, options = log.raw, log.options
     rows = np.flatnonzero(finite) if ticks is None or not finite.all() else None
     rate = options.rate or raw.rate
     if options.rate is not None and not (np.isfinite(options.rate) and options.rate > 0):
         raise ConfigError("io.rate-not-positive", quantity="--rate", rate=options.rate)
+    where: dict[str, Any] = {
+        "file": raw.name,
+        "row": lambda k: raw.row(k if rows is None else int(rows[k])),
+        "repair": options.repair,
+    }
     if ticks is None:
         assert rows is not None
         if rate is None:
-            raise DataError("io.time-column-missing", file=raw.name, quantity="time")
-        why = f"no time column: {rate:g} Hz as stated"
+            raise raw.fault("io.time-column-missing", "time")
         if numbered := counted(raw.columns):
             name, count = numbered
-            findings.append(
-                Finding(
-                    "io.time-from-counter",
-                    file=raw.name,
-                    quantity="time",
-                    severity="note",
-                    source=name,
-                    rate=rate,
-                    lost=int(count[-1]) + 1 - count.size,
-                )
-            )
-            said_by = f"samples as numbered by {name!r}, {rate:g} Hz as stated"
-            return read_stamps(
-                count[rows] / rate,
-                "s",
-                said_by,
-                file=raw.name,
-                row=lambda k: raw.row(int(rows[k])),
-                repair=options.repair,
-            )
+            lost = int(count[-1]) + 1 - count.size
+            log.note("io.time-from-counter", "time", source=name, rate=rate, lost=lost)
+            why = f"samples as numbered by {name!r}, {rate:g} Hz as stated"
+            return read_stamps(count[rows] / rate, "s", why, **where)
+        why = f"no time column: {rate:g} Hz as stated"
         everything = np.ones(rows.size, dtype=bool)
         return Stamps(rows / rate, "s", why, everything, Origin(0, "s"), [])
-    column = found["time"]
+    column, inferred = log.found["time"], log.said.get("time_unit")
     if options.rate is not None:
-        findings.append(
-            Finding(
-                "io.rate-not-used",
-                file=raw.name,
-                quantity="time",
-                severity="note",
-                rate=options.rate,
-                source=column.source,
-            )
-        )
+        log.note("io.rate-not-used", "time", rate=options.rate, source=column.source)
     unit, why = column.unit, "in its name"
     if dated:
         unit, why = "ns", "dates or times of day"
@@ -626,66 +522,29 @@ def stamps_of_log(
         unit, why = parse_unit(options.time_unit, "time"), options.why("time_unit")
     elif column.basis == "file":
         why = column.why
-    elif unit is None and "time_unit" in said and said["time_unit"].settled:
-        unit, why = str(said["time_unit"].value), str(said["time_unit"])
+    elif unit is None and inferred is not None and inferred.settled:
+        unit, why = str(inferred.value), str(inferred)
         if unit != "s":
-            findings.append(
-                said["time_unit"].finding("io.time-unit-inferred", file=raw.name, quantity="time")
-            )
-    stamps = read_stamps(
-        ticks if rows is None else ticks[rows],
-        unit,
-        why,
-        file=raw.name,
-        row=lambda k: raw.row(k if rows is None else int(rows[k])),
-        repair=options.repair,
-    )
-    findings += stamps.findings
+            said = inferred.finding("io.time-unit-inferred", file=raw.name, quantity="time")
+            log.findings.append(said)
+    stamps = read_stamps(ticks if rows is None else ticks[rows], unit, why, **where)
+    log.findings += stamps.findings
     return stamps
 
 
-def time_reading(raw: RawLog, found: dict[str, Column], stamps: Stamps, sample: int) -> Reading:
-    """Describe how the time column was read, with its value at the first sample used."""
-    if "time" not in found:
-        return Reading("(none)", "time", "s", stamps.why, 0.0)
-    source = found["time"].source
-    value = raw.columns[source][sample]
-    first = float(value) if raw.columns[source].dtype.kind in "iufb" else str(value)
-    return Reading(source, "time", stamps.unit, f"{found['time'].why}; unit {stamps.why}", first)
-
-
-def clock_of_log(raw: RawLog, found: dict[str, Column], stamps: Stamps, dated: bool) -> Clock:
-    """Return the clock of a log's stamps."""
-    if "time" not in found:
-        return Clock(RELATIVE)
+def _clock_of_log(log: LogInUse, stamps: Stamps, dated: bool, sample: int) -> tuple[Clock, Reading]:
+    """Return the clock of a log, and how its stamps were read, with the one of the first sample."""
+    if "time" not in log.found:
+        return Clock(RELATIVE), Reading("(none)", "time", "s", stamps.why, 0.0)
+    raw, column = log.raw, log.found["time"]
     origin = raw.epoch + float(stamps.origin.stamp) * TIME_UNITS[stamps.origin.unit]
-    first = origin + float(stamps.seconds[0])
-    name = raw.clock or clock_of_name(found["time"].source, first, dated=dated)
-    return Clock(name, origin)
+    since = origin + float(stamps.seconds[0])
+    name = raw.clock or clock_of_name(column.source, since, dated=dated)
+    values = raw.columns[column.source]
+    first = float(values[sample]) if values.dtype.kind in "iufb" else str(values[sample])
+    why = f"{column.why}; unit {stamps.why}"
+    return Clock(name, origin), Reading(column.source, "time", stamps.unit, why, first)
 
-
-def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]) -> str:
-    """Return the sampling stated by the user, else by the file, else instantaneous.
-
-    `findings`: assumptions are appended. Returns {'instantaneous', 'mean'}. ConfigError: the
-    sampling is unknown.
-    """
-    asked = (options.sampling or raw.sampling or "").lower()
-    if not asked:
-        findings.append(
-            Finding(
-                "io.sampling-taken-as-instantaneous",
-                severity="note",
-                file=raw.name,
-                quantity="sampling",
-            )
-        )
-        return "instantaneous"
-    check_choice("io.sampling-unknown", SAMPLINGS, quantity="--sampling", asked=asked)
-    return asked
-
-
-PLAUSIBILITY_AXES = "xyz"
 
 # No body that is carried, driven or flown turns this fast for a twentieth of a log.
 LASTING_RATE = 20.0  # rad/s, 3 turns a second
@@ -699,7 +558,7 @@ CUT_OFF_RUN = 3  # samples
 LONG_GAP = 1.0  # s
 
 
-def report_gaps(name: str, time: Array, gyro: Array, findings: list[Finding]) -> None:
+def _report_gaps(log: LogInUse, time: Array, gyro: Array) -> None:
     """Report gaps in time, and the rotation that the longest may hide."""
     gaps = find_gaps(time)
     if not gaps:
@@ -707,94 +566,79 @@ def report_gaps(name: str, time: Array, gyro: Array, findings: list[Finding]) ->
     worst = max(gaps, key=lambda g: g.length)
     speed = np.sqrt((gyro[worst.sample - 1 : worst.sample + 1] ** 2).sum(axis=1)).max()
     missed = float(np.degrees(speed * worst.length))
-    findings.append(
-        Finding(
-            "io.long-gap" if worst.length >= LONG_GAP else "io.gaps",
-            file=name,
-            quantity="time",
-            severity="warning" if worst.length >= LONG_GAP else "note",
-            count=len(gaps),
-            length=worst.length,
-            start=worst.start,
-            end=worst.end,
-            usual=worst.usual,
-            missed_deg=missed,
-        )
+    log.warn(
+        "io.long-gap" if worst.length >= LONG_GAP else "io.gaps",
+        "time",
+        severity="warning" if worst.length >= LONG_GAP else "note",
+        count=len(gaps),
+        length=worst.length,
+        start=worst.start,
+        end=worst.end,
+        usual=worst.usual,
+        missed_deg=missed,
     )
 
 
-def _refuse_impossible(name: str, body: Mapping[str, Array], row: Callable[[int], int]) -> None:
-    """Refuse values beyond the limits of any body. DataError: names row and column."""
+def _report_beyond_limits(
+    log: LogInUse, body: Mapping[str, Array], kept: NDArray[np.int64]
+) -> None:
+    """Report rates that are implausible, or clipped at the sensor's full scale.
+
+    DataError: a value is beyond the limits of any body; names row and column.
+    """
     limits = {
         "gyro": ("io.rate-impossible", IMPOSSIBLE_RATE),
         "accel": ("io.force-impossible", IMPOSSIBLE_FORCE),
     }
+    sizes: dict[str, Array] = {}
     for triad, (code, limit) in limits.items():
-        if triad not in body or _largest(body[triad]).max() <= limit:
+        if triad not in body:
             continue
-        at, k = (int(i) for i in np.argwhere(~(np.abs(body[triad]) <= limit))[0])
-        quantity = f"{triad}_{PLAUSIBILITY_AXES[k]}"
-        raise DataError(code, file=name, row=row(at), quantity=quantity, value=body[triad][at, k])
-
-
-def _largest(values: Array) -> Array:
-    """Largest magnitude of each channel; NaN where one is NaN."""
-    out = np.empty(values.shape[1])
-    for k, channel in enumerate(values.T):
-        out[k] = np.maximum(channel.max(), -channel.min())
-        let_go(values)
-    return out
-
-
-def report_absurd(
-    name: str, gyro: Array, row: Callable[[int], int], findings: list[Finding]
-) -> None:
-    """Report rates that are implausible, or clipped at the sensor's full scale."""
-    largest = _largest(gyro)
+        # Largest magnitude of each channel; NaN where one is NaN.
+        sizes[triad] = np.empty(3)
+        for k, channel in enumerate(body[triad].T):
+            sizes[triad][k] = np.maximum(channel.max(), -channel.min())
+            let_go(body[triad])
+        if not sizes[triad].max() <= limit:
+            at, k = (int(i) for i in np.argwhere(~(np.abs(body[triad]) <= limit))[0])
+            raise DataError(
+                code,
+                file=log.raw.name,
+                row=log.raw.row(int(kept[at])),
+                quantity=f"{triad}_{AXES[k]}",
+                value=body[triad][at, k],
+            )
+    gyro, largest = body["gyro"], sizes["gyro"]
     k = int(largest.argmax())
     lasting = 0.0
     if LASTING_RATE < largest[k] <= ABSURD_RATE:
         lasting = float(np.quantile(np.sqrt((gyro * gyro).sum(axis=1)), 0.95))
     if LASTING_RATE < lasting <= largest[k]:
-        findings.append(
-            Finding(
-                "io.rate-absurd-for-long",
-                file=name,
-                quantity="gyro",
-                lasting=lasting,
-                lasting_2=lasting / (2 * np.pi),
-            )
-        )
+        turns = lasting / (2 * np.pi)
+        log.warn("io.rate-absurd-for-long", "gyro", lasting=lasting, lasting_2=turns)
     if largest[k] > ABSURD_RATE:
         at = int(np.abs(gyro[:, k]).argmax())
-        findings.append(
-            Finding(
-                "io.rate-absurd",
-                file=name,
-                row=row(at),
-                quantity=f"gyro_{PLAUSIBILITY_AXES[k]}",
-                gyro=gyro[at, k],
-                largest=largest[k] / (2 * np.pi),
-            )
+        log.warn(
+            "io.rate-absurd",
+            f"gyro_{AXES[k]}",
+            row=log.raw.row(int(kept[at])),
+            gyro=gyro[at, k],
+            largest=largest[k] / (2 * np.pi),
         )
     for k in range(3):
         reading = float(np.degrees(largest[k]))
         # The largest 16-bit reading is one step below the full scale.
-        scale = next((s for s in FULL_SCALES if s * (1 - 1e-3) <= reading <= s * 1.0001), None)
-        if scale is None:
+        if not any(s * (1 - 1e-3) <= reading <= s * 1.0001 for s in FULL_SCALES):
             continue
         full = np.abs(gyro[:, k]) == largest[k]
         run = np.convolve(full, np.ones(CUT_OFF_RUN), mode="valid") == CUT_OFF_RUN
         if run.any():
-            findings.append(
-                Finding(
-                    "io.rate-at-full-scale",
-                    file=name,
-                    row=row(int(run.argmax())),
-                    quantity=f"gyro_{PLAUSIBILITY_AXES[k]}",
-                    full=int(full.sum()),
-                    reading=reading,
-                )
+            log.warn(
+                "io.rate-at-full-scale",
+                f"gyro_{AXES[k]}",
+                row=log.raw.row(int(kept[int(run.argmax())])),
+                full=int(full.sum()),
+                reading=reading,
             )
 
 
@@ -805,9 +649,9 @@ WEIGHTLESS = 0.3 * STANDARD_GRAVITY  # m/s²
 SOME = 100_000
 
 
-def report_weightless(name: str, accel: Array | None, findings: list[Finding]) -> None:
+def _report_weightless(log: LogInUse, accel: Array | None) -> None:
     """Report a specific force too small for gravity, which the numbers left open without a unit."""
-    if accel is None or any(f.code == "io.no-gravity" for f in findings):
+    if accel is None or any(f.code == "io.no-gravity" for f in log.findings):
         return
     some = np.empty((len(range(0, len(accel), 1 + len(accel) // SOME)), 3))
     for k, channel in enumerate(accel.T):
@@ -817,27 +661,19 @@ def report_weightless(name: str, accel: Array | None, findings: list[Finding]) -
         usual = float(np.sqrt(np.median((some * some).sum(axis=1))))
     if usual < WEIGHTLESS:
         reason = Finding("io.evidence-force-too-small", severity="note", usual=usual)
-        findings.append(Finding("io.no-gravity", file=name, quantity="accel", reason=reason))
+        log.warn("io.no-gravity", "accel", reason=reason)
 
 
-def finite_rows(
-    raw: RawLog,
-    found: dict[str, Column],
-    ticks: NDArray[Any] | None,
-    values: dict[str, Array],
-    options: ReadOptions,
-    findings: list[Finding],
-) -> NDArray[np.bool_]:
+def _finite_rows(log: LogInUse, ticks: NDArray[Any] | None) -> NDArray[np.bool_]:
     """Select the rows in which every used value is a number; (n,).
 
-    `ticks` ((n,)): stamps as in the file. `values` ((n, 3)): values of the triads used. `options`:
-    whether rows may be dropped. `findings`: the number of dropped rows is appended. DataError: a
-    row cannot be used and may not be dropped, or no row is left.
+    `ticks` ((n,)): stamps as in the file. The number of dropped rows is reported. DataError: a row
+    cannot be used and may not be dropped, or no row is left.
     """
-    blocks = dict(values)
+    raw, blocks = log.raw, dict(log.values)
     if ticks is not None:
         blocks = {"time": ticks[:, None].astype(np.float64, copy=False)} | blocks
-    keep = np.ones(len(values["gyro"]), dtype=bool)
+    keep = np.ones(len(blocks["gyro"]), dtype=bool)
     for name, block in blocks.items():
         if name in raw.sparse or all_finite(block):
             continue
@@ -845,29 +681,19 @@ def finite_rows(
         row, column = (int(i) for i in np.argwhere(bad)[0])
         quantity = name if name == "time" else f"{name}_{AXES[column]}"
         count = int(bad.any(axis=1).sum())
-        if not options.repair:
-            raise DataError(
+        if not log.options.repair:
+            raise raw.fault(
                 "io.not-finite-in-rows",
-                file=raw.name,
-                row=raw.row(row),
-                quantity=quantity,
+                quantity,
+                sample=row,
                 block=block[row, column],
-                source=found[quantity].source,
+                source=log.found[quantity].source,
                 count=count,
             )
-        findings.append(
-            Finding(
-                "io.rows-without-number-left-out",
-                file=raw.name,
-                row=raw.row(row),
-                quantity=quantity,
-                severity="note",
-                count=count,
-            )
-        )
+        log.note("io.rows-without-number-left-out", quantity, row=raw.row(row), count=count)
         keep &= ~bad.any(axis=1)
     if not keep.any():
-        raise DataError("io.no-usable-row", file=raw.name)
+        raise raw.fault("io.no-usable-row")
     return keep
 
 
@@ -881,22 +707,17 @@ AS_THEY_ARE: Turn = ([0, 1, 2], [1.0, 1.0, 1.0])
 LOST = 1e-6
 
 
-def truth_of_log(
-    raw: RawLog,
-    found: dict[str, Column],
-    time: Array,
-    kept: NDArray[np.int64],
-    axes: Turn,
-    readings: list[Reading],
-    findings: list[Finding],
+def _truth_of_log(
+    log: LogInUse, time: Array, kept: NDArray[np.int64], axes: Turn, readings: list[Reading]
 ) -> tuple[pd.DataFrame | None, NDArray[np.bool_] | None]:
     """Return the truth of a log, in the body axes that the log is read in.
 
     `time` ((n,), s): stamps of the rows used. `kept` ((n,)): those rows. `axes`: sensor axis of
-    each body axis, and its sign. `readings`, `findings`: its source columns and findings are
-    appended. Returns `scored` (or None): rows of `truth` that count for errors. ConfigError: the
-    axes are a mirror image, for which no attitude exists.
+    each body axis, and its sign. `readings`: its source columns are appended. Returns `scored` (or
+    None): rows of `truth` that count for errors. ConfigError: the axes are a mirror image, for
+    which no attitude exists.
     """
+    raw, found = log.raw, log.found
     if raw.truth is not None:
         q_ns, scored = raw.truth.q_ns[kept], raw.truth.scored[kept]
     else:
@@ -907,14 +728,7 @@ def truth_of_log(
             if raw.axes != "x,y,z" and any(
                 set(names) <= set(found) for names in (QUATERNIONS, EULERS)
             ):
-                findings.append(
-                    Finding(
-                        "io.attitude-not-used",
-                        severity="note",
-                        file=raw.name,
-                        quantity="attitude",
-                    )
-                )
+                log.note("io.attitude-not-used", "attitude")
             return None, None
         # Avoid copies of a long log.
         q = q if kept.size == len(q) else q[kept]
@@ -1009,7 +823,7 @@ def _quaternions(raw: RawLog, found: dict[str, Column]) -> tuple[Array | None, l
     if units == {"rad"}:
         angles = np.degrees(angles)
     elif units != {"deg"}:
-        raise DataError("io.unit-angles-not-stated", file=raw.name, quantity=", ".join(EULERS))
+        raise raw.fault("io.unit-angles-not-stated", ", ".join(EULERS))
     finite = np.isfinite(angles).all(axis=1)
     q = np.full((len(angles), 4), np.nan)
     q[finite] = rotation.quaternion_from_euler(angles[finite])

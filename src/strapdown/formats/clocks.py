@@ -26,7 +26,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats.inference.conclusion import (
     THRESHOLD,
     differenced,
@@ -34,32 +34,10 @@ from strapdown.formats.inference.conclusion import (
     wrap_bits,
 )
 from strapdown.formats.recording import Origin
-from strapdown.tables.checks import RELATIVE
+from strapdown.tables.checks import RELATIVE as RELATIVE
 from strapdown.tables.on_disk import filled, let_go, step_range
 from strapdown.tables.sample_clock import sample_clock
 from strapdown.units import TIME_UNITS
-
-__all__ = [
-    "GPS",
-    "RELATIVE",
-    "UNIX",
-    "WEEK",
-    "Clock",
-    "clock_of",
-    "clock_of_name",
-    "counted",
-    "gps_from_unix",
-    "leap_seconds",
-    "on_clock_of",
-    "own_ns",
-    "time_column",
-    "unix_from_gps",
-    "unrolled",
-    "usual_step",
-    "with_clock",
-    "year_of",
-]
-
 
 Array = NDArray[np.float64]
 GPS, UNIX = "gps-seconds-of-week", "unix"
@@ -97,11 +75,7 @@ _MODERN = 1e9  # s
 class Clock:
     """Clock of a table's time; see the module.
 
-    Attributes
-    ----------
-    name : str
-    origin : float, s
-    week : int or None
+    `origin` (s).
     """
 
     name: str
@@ -281,13 +255,7 @@ def on_clock_of(
     out.attrs = {**table.attrs, "clock": other.name, "clock_origin": other.origin}
     out.attrs["clock_origin_stamp"] = imu.attrs.get("clock_origin_stamp")
     out.attrs["gps_week"] = other.week
-    return out, Finding(
-        code,
-        file=file,
-        quantity="time",
-        severity="note",
-        shift=shift,
-    )
+    return out, Finding(code, file=file, quantity="time", severity="note", shift=shift)
 
 
 # Samples that are numbered.
@@ -335,22 +303,37 @@ OFF_TICK = 0.1
 
 @dataclass(frozen=True)
 class EvenStamps:
-    """Stamps at a constant rate that fit those of a clock with coarse ticks.
+    """Stamps at a constant rate in place of those of a coarse clock, or shared by bursts.
 
-    Attributes
-    ----------
-    ticks : ndarray, (n,)
-        In the unit of the stamps.
-    tick, step : float
-        Tick of the clock and step of the samples, in the unit of the stamps.
-    off : float
-        Largest distance of a stamp from its tick.
+    `ticks` ((n,)), `step`: in the unit of the stamps, like all others. `tick`, `off`: tick of a
+    coarse clock, and largest distance of a stamp from it. `spread`, `size`: standard deviation of
+    the deliveries of bursts, and mean number of samples of one.
     """
 
     ticks: NDArray[Any]
-    tick: float
     step: float
-    off: float
+    tick: float = 0.0
+    off: float = 0.0
+    spread: float = 0.0
+    size: float = 0.0
+
+    def finding(self, factor: float, **where: Any) -> Finding:
+        """Report them. `factor`: of the unit of the stamps, s."""
+        if self.size:
+            data = {
+                "size": self.size,
+                "rate_hz": 1.0 / (self.step * factor),
+                "spread": self.spread * factor,
+                "interval": self.size * self.step * factor,
+            }
+            return Finding("io.stamps-shared-by-bursts", data=data, **where)
+        data = {
+            "tick": self.tick * factor,
+            "rate": 1.0 / (self.step * factor),
+            "rate_within": self.tick / (self.step**2 * max(self.ticks.size - 1, 1) * factor),
+            "off": self.off * factor,
+        }
+        return Finding("io.stamps-spread-evenly", data=data, **where)
 
 
 def even_stamps(stamps: NDArray[Any]) -> EvenStamps | None:
@@ -394,31 +377,11 @@ def even_stamps(stamps: NDArray[Any]) -> EvenStamps | None:
     first = 0.5 * (float(rest.max()) + float(rest.min()) + tick)
     even = first + step * np.arange(exact.size)
     if exact.dtype.kind == "i" and step > 1000.0:
-        return EvenStamps(exact[0] + np.rint(even).astype(np.int64), tick, step, off)
-    return EvenStamps(exact[0] + even, tick, step, off)
+        return EvenStamps(exact[0] + np.rint(even).astype(np.int64), step, tick, off)
+    return EvenStamps(exact[0] + even, step, tick, off)
 
 
-@dataclass(frozen=True)
-class SpreadBursts:
-    """Stamps of samples that share one by one burst, spread over an even clock.
-
-    Attributes
-    ----------
-    ticks : ndarray, (n,)
-        In the unit of the stamps.
-    step, spread : float
-        Step of the samples, and standard deviation of the deliveries, in the unit of the stamps.
-    size : float
-        Mean number of samples of a burst.
-    """
-
-    ticks: NDArray[Any]
-    step: float
-    spread: float
-    size: float
-
-
-def spread_bursts(stamps: NDArray[Any]) -> SpreadBursts | None:
+def spread_bursts(stamps: NDArray[Any]) -> EvenStamps | None:
     """Spread samples that are delivered together, by their clock (`tables.sample_clock`).
 
     None if no stamps repeat, any goes back, or the deliveries scatter by half their interval.
@@ -441,7 +404,7 @@ def spread_bursts(stamps: NDArray[Any]) -> SpreadBursts | None:
         return None
     whole = exact.dtype.kind == "i" and clock.step > 1000.0
     ticks = exact[0] + (np.rint(clock.time).astype(np.int64) if whole else clock.time)
-    return SpreadBursts(ticks, clock.step, clock.spread, size)
+    return EvenStamps(ticks, clock.step, spread=clock.spread, size=size)
 
 
 # Time stamps of a log: units, faults and repairs.
@@ -465,17 +428,8 @@ EPOCH = 1e6  # s
 class Stamps:
     """Stamps in seconds, with findings.
 
-    Attributes
-    ----------
-    seconds : ndarray, (n,)
-    unit : str
-    why : str
-        Reason for the unit.
-    keep : ndarray of bool, (n,)
-        Rows that remain when those with faulty stamps are dropped.
-    origin : Origin
-        The raw stamp at time zero.
-    findings : list of Finding
+    `seconds` ((n,)). `why`: reason for the unit. `keep` ((n,)): rows that remain when those with
+    faulty stamps are dropped. `origin`: the raw stamp at time zero.
     """
 
     seconds: Array
@@ -530,35 +484,34 @@ def read_stamps(
         whole, weeks = unrolled(stamps.astype(np.float64, copy=False))
         if weeks:
             stamps, unit = whole, "s"
-            findings.append(
-                Finding(
-                    "io.seconds-of-week-unrolled",
-                    file=file,
-                    row=row(weeks[0]),
-                    quantity="time",
-                    severity="note",
-                )
+            add_note(
+                findings,
+                "io.seconds-of-week-unrolled",
+                file=file,
+                row=row(weeks[0]),
+                quantity="time",
             )
     # Exact, before a factor rounds it.
     ticks = filled(len(stamps), lambda part: (stamps[part] - stamps[0]).astype(np.float64))
     let_go(stamps)
-    if not repair:
-        _refuse_backward(stamps, ticks, file, row)
-    keep, ticks = _repaired(stamps, ticks, file, findings)
+    keep = np.ones(ticks.size, dtype=bool)
+    if len(ticks) > 1 and step_range(ticks)[0] <= 0.0:
+        if not repair:
+            raise _backward(stamps, ticks, file, row)
+        keep, ticks = _repaired(stamps, ticks, file, findings)
     kept = slice(None) if keep.all() else keep
     if unit is None:
         unit, why = _evident_unit(stamps[kept], file, findings, only_seconds)
     elif (usual := _mean_step(ticks[kept]) * TIME_UNITS[unit]) > 0 and not (
         PLAUSIBLE_STEP[0] <= usual <= 4 * PLAUSIBLE_STEP[1]
     ):
-        findings.append(
-            Finding(
-                "io.stated-time-unit-implausible",
-                file=file,
-                quantity="time",
-                unit=unit,
-                usual=1.0 / usual,
-            )
+        add_warning(
+            findings,
+            "io.stated-time-unit-implausible",
+            file=file,
+            quantity="time",
+            unit=unit,
+            usual=1.0 / usual,
         )
     factor = TIME_UNITS[unit]
     first = stamps[0].item()
@@ -566,15 +519,13 @@ def read_stamps(
         far = abs(first) * factor > EPOCH
         origin = Origin(first if far else 0, unit)
         if far:
-            findings.append(
-                Finding(
-                    "io.time-from-first-stamp",
-                    file=file,
-                    quantity="time",
-                    severity="note",
-                    first=first,
-                    unit=unit,
-                )
+            add_note(
+                findings,
+                "io.time-from-first-stamp",
+                file=file,
+                quantity="time",
+                first=first,
+                unit=unit,
             )
     # Exact if both count whole ticks of one unit.
     if unit == origin.unit:
@@ -583,7 +534,9 @@ def read_stamps(
         since = first * factor - origin.stamp * TIME_UNITS[origin.unit]
     seconds = filled(len(ticks), lambda part: since + ticks[part] * factor)
     let_go(ticks)
-    keep = _without_pauses(seconds, keep, repair, file, row, findings)
+    # In ordinary logs no pause is longer than the log.
+    if np.ptp(seconds) > LONGEST_PAUSE:
+        keep = _without_pauses(seconds, keep, repair, file, row, findings)
     return Stamps(seconds, unit, why, keep, origin, findings)
 
 
@@ -649,9 +602,6 @@ def _without_pauses(
 
     DataError: there is such a pause, and rows may not be dropped.
     """
-    # Ordinary logs end here: no pause is longer than the log.
-    if not np.ptp(seconds) > LONGEST_PAUSE:
-        return keep
     rows = np.flatnonzero(keep)
     time = seconds[rows]
     steps = np.diff(time)
@@ -686,57 +636,30 @@ def _mean_step(ticks: Array) -> float:
     return float((ticks[-1] - ticks[0]) / (ticks.size - 1)) if ticks.size > 1 else 0.0
 
 
-def _refuse_backward(
+def _backward(
     stamps: NDArray[Any], ticks: Array, file: str, row: Callable[[int], int]
-) -> None:
-    if len(ticks) < 2 or step_range(ticks)[0] > 0.0:
-        return
+) -> DataError:
+    """Make the error for stamps that do not advance."""
     steps = np.diff(ticks)
     bad = np.flatnonzero(steps <= 0)
-    if not bad.size:
-        return
     k = int(bad[0])
     here, then = stamps[k], stamps[k + 1]
+    where: dict[str, Any] = {"file": file, "row": row(k + 1), "quantity": "time"}
     if steps[k] == 0 and bad.size > COARSE * steps.size:
         counts = np.diff(np.flatnonzero(steps))
-        raise DataError(
+        return DataError(
             "io.stamps-of-uneven-bursts",
-            file=file,
-            row=row(k + 1),
-            quantity="time",
+            **where,
             then=then,
             count=bad.size,
             least=int(counts.min(initial=steps.size)),
             most=int(counts.max(initial=1)),
         )
     if steps[k] == 0:
-        raise DataError(
-            "io.stamp-repeated",
-            file=file,
-            row=row(k + 1),
-            quantity="time",
-            then=then,
-            count=bad.size,
-        )
+        return DataError("io.stamp-repeated", **where, then=then, count=bad.size)
     if bits := wrap_bits(stamps[k], steps[k], usual_step(steps)):
-        raise DataError(
-            "io.time-counter-wraps",
-            file=file,
-            row=row(k + 1),
-            quantity="time",
-            here=here,
-            then=then,
-            bits=bits,
-        )
-    raise DataError(
-        "io.time-goes-back",
-        file=file,
-        row=row(k + 1),
-        quantity="time",
-        here=here,
-        then=then,
-        count=bad.size,
-    )
+        return DataError("io.time-counter-wraps", **where, here=here, then=then, bits=bits)
+    return DataError("io.time-goes-back", **where, here=here, then=then, count=bad.size)
 
 
 def usual_step(steps: Array) -> float:
@@ -748,8 +671,6 @@ def usual_step(steps: Array) -> float:
 def _repaired(
     stamps: NDArray[Any], ticks: Array, file: str, findings: list[Finding]
 ) -> tuple[NDArray[np.bool_], Array]:
-    if len(ticks) < 2 or step_range(ticks)[0] > 0.0:
-        return np.ones(ticks.size, dtype=bool), ticks
     steps = np.diff(ticks)
     usual = usual_step(steps)
     added = np.zeros(ticks.size)
@@ -758,28 +679,19 @@ def _repaired(
             added[k + 1] = 2.0**bits
     if wraps := int(np.count_nonzero(added)):
         ticks = ticks + np.cumsum(added)
-        findings.append(
-            Finding(
-                "io.counter-wrapped-undone",
-                file=file,
-                quantity="time",
-                severity="note",
-                count=wraps,
-            )
-        )
+        add_note(findings, "io.counter-wrapped-undone", file=file, quantity="time", count=wraps)
     latest = np.maximum.accumulate(np.concatenate([[-np.inf], ticks[:-1]]))
     keep = ticks > latest
     if dropped := int((~keep).sum()):
         back = _set_back(ticks, keep, usual)
-        findings.append(
-            Finding(
-                "io.rows-not-later-left-out" if not back else "io.rows-after-step-back-left-out",
-                file=file,
-                quantity="time",
-                severity="warning" if back or dropped > 0.1 * ticks.size else "note",
-                count=dropped,
-                back=back,
-            )
+        add_warning(
+            findings,
+            "io.rows-not-later-left-out" if not back else "io.rows-after-step-back-left-out",
+            file=file,
+            quantity="time",
+            severity="warning" if back or dropped > 0.1 * ticks.size else "note",
+            count=dropped,
+            back=back,
         )
     return keep, ticks
 

@@ -43,16 +43,6 @@ from strapdown.formats.vocabularies import (
 )
 from strapdown.units import ACCEL_UNITS, FACTORS, OF_LOGS, find_unit, unit_of, unit_words
 
-__all__ = [
-    "ColumnName",
-    "clocks_with_unit",
-    "parse_axes",
-    "parse_column_option",
-    "read_name",
-    "split_brackets",
-]
-
-
 _AXES = "xyz"
 #: A column of an array: its name and its number.
 INDEXED = re.compile(r"(.*)\[(\d+)\]")
@@ -90,48 +80,33 @@ UNKNOWN_WORDS = 3
 
 @dataclass(frozen=True)
 class ColumnName:
-    """Quantity, axis and unit as read from the name of a column.
+    """Quantity, axis and unit as read from the name of a column."""
 
-    Attributes
-    ----------
-    quantity : str or None
-        Of the vocabulary; of a sensor with its axis, ``gyro_x``, or a triad's name where the column
-        holds three numbers or the name ends in a number.
-    unit : str or None
-        In the spelling of this package; as written where it is none of the vocabulary's.
-    loose : int
-        Evidence: 0 for a name that is known as it is, 1 behind a word such as ``gps_``, in another
-        order, or with an axis that is only likely, 2 if only some words are known, 3
-        (`UNKNOWN_WORDS`) if a sensor and an axis are among words that are not.
-    family : str
-        Of a sensor: the name without its axis. Columns of one sensor share it. One letter may mean
-        anything.
-    linear : bool
-        The name says acceleration without gravity, as phones have it; in ROS it has gravity.
-    increment : bool
-        The name says increments per sample.
-    number : int or None
-        At the end of the name of a triad: ``gyro_1``.
-    sign : float
-        -1 for the opposite of the quantity: a velocity up.
-    axis : str
-        In a crash record: ``x y z``, with a minus if the name states it, or empty.
-    change : bool
-        In a crash record: a velocity that is a change since time zero.
-    spoken : str
-        In a crash record: the quantity that the words say, where the unit is of another one.
-    """
-
+    #: Of the vocabulary; of a sensor with its axis, ``gyro_x``, or a triad's name where the column
+    #: holds three numbers or the name ends in a number.
     quantity: str | None
+    #: In the spelling of this package; as written where it is none of the vocabulary's.
     unit: str | None = None
+    #: Evidence: 0 for a name that is known as it is, 1 behind a word such as ``gps_``, in another
+    #: order, or with an axis that is only likely, 2 if only some words are known, 3
+    #: (`UNKNOWN_WORDS`) if a sensor and an axis are among words that are not.
     loose: int = 0
+    #: Of a sensor: the name without its axis. Columns of one sensor share it. One letter may mean
+    #: anything.
     family: str = ""
+    #: The name says acceleration without gravity, as phones have it; in ROS it has gravity.
     linear: bool = False
+    #: The name says increments per sample.
     increment: bool = False
+    #: At the end of the name of a triad: ``gyro_1``.
     number: int | None = None
+    #: -1 for the opposite of the quantity: a velocity up.
     sign: float = 1.0
+    #: In a crash record: ``x y z``, with a minus if the name states it, or empty.
     axis: str = ""
+    #: In a crash record: a velocity that is a change since time zero.
     change: bool = False
+    #: In a crash record: the quantity that the words say, where the unit is of another one.
     spoken: str = ""
 
 
@@ -588,8 +563,13 @@ def parse_axes(text: str) -> tuple[list[int], list[float]]:
     sensor's x, y and z: ``forward-left-up``, which is equivalent. Returns `axis`: sensor axis of
     each body axis, 0 to 2. ConfigError: the text is not a signed permutation of three axes.
     """
-    if said := _directions(text):
-        return said
+    words = re.split(r"[\s,\-]+", text.strip().lower())
+    if len(words) == 3 and all(w in _DIRECTIONS for w in words):
+        said = [_DIRECTIONS[w] for w in words]
+        if sorted(body for body, _ in said) != [0, 1, 2]:
+            raise ConfigError("io.axes-name-direction-twice", quantity="--axes", text=text)
+        axis = [next(k for k, (body, _) in enumerate(said) if body == b) for b in range(3)]
+        return axis, [said[k][1] for k in axis]
     parts = [p.strip().lower() for p in text.split(",")]
     names = [p.lstrip("+-") for p in parts]
     if sorted(names) != ["x", "y", "z"] or any(
@@ -597,15 +577,3 @@ def parse_axes(text: str) -> tuple[list[int], list[float]]:
     ):
         raise ConfigError("io.axes-not-three", quantity="--axes", text=text)
     return [_AXES.index(n) for n in names], [-1.0 if p.startswith("-") else 1.0 for p in parts]
-
-
-def _directions(text: str) -> tuple[list[int], list[float]] | None:
-    """Convert directions of the sensor's x, y, z in words to sensor axes of the body axes."""
-    words = re.split(r"[\s,\-]+", text.strip().lower())
-    if len(words) != 3 or any(w not in _DIRECTIONS for w in words):
-        return None
-    said = [_DIRECTIONS[w] for w in words]
-    if sorted(body for body, _ in said) != [0, 1, 2]:
-        raise ConfigError("io.axes-name-direction-twice", quantity="--axes", text=text)
-    axis = [next(k for k, (body, _) in enumerate(said) if body == b) for b in range(3)]
-    return axis, [said[k][1] for k in axis]

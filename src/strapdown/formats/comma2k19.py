@@ -18,16 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import frames, rotation
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import table_files
 from strapdown.formats.clocks import RELATIVE, Clock
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.join import join
 from strapdown.formats.recording import NoStreamError, RawLog, TruthInSensorAxes
 from strapdown.formats.signs import Signs
-
-__all__ = ["belongs", "detect", "files_of", "read", "read_fixes"]
-
 
 Array = NDArray[np.float64]
 
@@ -42,31 +39,17 @@ AXES = "x,y,z"
 LONGEST_STEP = 0.5  # s
 
 
-def _has_arrays(folder: Path) -> bool:
-    """Whether a folder has the arrays of the gyro or of a receiver."""
-    return _find(folder, "IMU", "gyro", "t") is not None or bool(files_of(folder))
-
-
-detect = Signs(folder=_has_arrays)
+# The arrays of the gyro or of a receiver.
+detect = Signs(
+    folder=lambda path: _find(path, "IMU", "gyro", "t") is not None or bool(files_of(path))
+)
 
 
 def read(path: Path) -> RawLog:
     """Read gyro, accelerometer, magnetometer and, if present, the pose as truth.
 
-    Parameters
-    ----------
-    path : Path
-        The folder of a segment, its ``processed_log``, or the folder of the arrays.
-
-    Returns
-    -------
-    RawLog
-        The truth is at the gyro sample nearest to each camera frame.
-
-    Raises
-    ------
-    DataError
-        An array is damaged or has the wrong shape.
+    `path`: the folder of a segment, its ``processed_log``, or the folder of the arrays. The truth
+    is at the gyro sample nearest to each camera frame.
     """
     name = path.resolve().name
     logs, files = [], []
@@ -155,9 +138,7 @@ def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None
     order = order[np.diff(times[order], prepend=-np.inf) > 0]
     time = raw.columns[next(n for n, (q, _) in raw.stated.items() if q == "time")]
     if order.size < 2:
-        raw.findings.append(
-            Finding("io.left-out-poses-hold-no", file=name, quantity="attitude", severity="note")
-        )
+        add_note(raw.findings, "io.left-out-poses-hold-no", file=name, quantity="attitude")
         return None, files
     lat_deg, lon_deg, _ = frames.geodetic_from_ecef(positions[order]).T
     q_nd = rotation.compose(frames.q_ne(lat_deg, lon_deg), q_ed[order] / norm[order, None])
@@ -166,16 +147,14 @@ def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None
     truth[sample] = q
     if sample.size:
         off = np.abs(times[order][:, None] - time[sample]).min(axis=0).max()
-        raw.findings.append(
-            Finding(
-                "io.attitude-frames-turned-ecef-north",
-                file=name,
-                quantity="attitude",
-                severity="note",
-                size=order.size,
-                size_2=sample.size,
-                off=off,
-            )
+        add_note(
+            raw.findings,
+            "io.attitude-frames-turned-ecef-north",
+            file=name,
+            quantity="attitude",
+            size=order.size,
+            size_2=sample.size,
+            off=off,
         )
     return TruthInSensorAxes(truth, np.isfinite(truth).all(axis=1)), files
 
@@ -261,7 +240,7 @@ def read_fixes(path: Path) -> Fixes:
     """Read the fixes of a segment.
 
     Returns without standard deviations. Speed and bearing are converted to velocity north and east;
-    down is not measured. DataError: an array is damaged or has the wrong shape.
+    down is not measured.
     """
     files = files_of(path)
     if not files:
@@ -306,20 +285,17 @@ def read_fixes(path: Path) -> Fixes:
 def _dated(t: Array, utc: Array, name: str, findings: list[Finding]) -> Array:
     """Compute when each fix was measured, on the clock of the stamps."""
     if not (np.isfinite(utc).all() and np.isfinite(t).all() and (np.diff(utc) > 0.0).all()):
-        findings.append(
-            Finding("io.not-every-fix-utc-later", file=name, quantity="time", severity="note")
-        )
+        add_note(findings, "io.not-every-fix-utc-later", file=name, quantity="time")
         return t
     seconds = utc * 1e-3 if utc.max() > IN_MS else utc
     late = t - seconds
     late -= late.min()
-    findings.append(
-        Finding(
-            "io.comma2k19-fixes-dated-by-utc",
-            file=name,
-            quantity="time",
-            late=late.max(),
-            median=np.median(late),
-        )
+    add_warning(
+        findings,
+        "io.comma2k19-fixes-dated-by-utc",
+        file=name,
+        quantity="time",
+        late=late.max(),
+        median=np.median(late),
     )
     return np.asarray(t - late)

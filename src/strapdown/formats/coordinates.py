@@ -15,12 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
 from strapdown.formats.arrays import numbers
 from strapdown.formats.find_columns import Found
 from strapdown.formats.recording import RawLog
-
-__all__ = ["with_degrees"]
 
 Array = NDArray[np.float64]
 
@@ -59,7 +56,6 @@ def with_degrees(raw: RawLog, found: Mapping[str, Found]) -> RawLog:
             size = changed[source] if source in changed else numbers(raw, source, quantity)
             changed[source] = side * np.abs(np.asarray(size, dtype=np.float64))
     places = {q: changed.get(found[q].source, raw.columns[found[q].source]) for q in _ANGLES}
-    findings = []
     if all(v.dtype.kind in "iuf" for v in places.values()):
         form, scaled = _in_one_number(places)
         changed |= {found[q].source: v for q, v in scaled.items()}
@@ -67,21 +63,17 @@ def with_degrees(raw: RawLog, found: Mapping[str, Found]) -> RawLog:
         if form == "1e-7 deg" and not found["lat"].source.lower().endswith("e7"):
             changed |= _heights_in_mm(raw, found)
         if form:
-            findings.append(
-                Finding(
-                    "io.coordinates-in-one-number",
-                    severity="note",
-                    file=raw.name,
-                    quantity="lat, lon",
-                    form=form,
-                    lat=float(scaled["lat"][0]),
-                    lon=float(scaled["lon"][0]),
-                )
+            raw.note(
+                "io.coordinates-in-one-number",
+                "lat, lon",
+                form=form,
+                lat=float(scaled["lat"][0]),
+                lon=float(scaled["lon"][0]),
             )
     if not changed:
         return raw
     columns = {name: changed.get(name, values) for name, values in raw.columns.items()}
-    return dataclasses.replace(raw, columns=columns, findings=[*raw.findings, *findings])
+    return dataclasses.replace(raw, columns=columns)
 
 
 def _of_texts(raw: RawLog, source: str, quantity: str, letters: str) -> Array:
@@ -97,14 +89,7 @@ def _of_texts(raw: RawLog, source: str, quantity: str, letters: str) -> Array:
         # Minutes and seconds are up to 60, by rounding, and what is before them is whole.
         fits = all(p <= 60.0 for p in parts[1:]) and all(p % 1.0 == 0.0 for p in parts[:-1])
         if match is None or not fits or len(side) > 1 or side not in letters:
-            raise DataError(
-                "io.no-coordinate",
-                file=raw.name,
-                row=raw.row(k),
-                quantity=quantity,
-                text=plain,
-                source=source,
-            )
+            raise raw.fault("io.no-coordinate", quantity, sample=k, text=plain, source=source)
         size = sum(part / 60.0**power for power, part in enumerate(parts))
         out[k] = -size if side == letters[1] or match["sign"] in ("-", "−") else size
     return out
@@ -155,10 +140,9 @@ def _heights_in_mm(raw: RawLog, found: Mapping[str, Found]) -> dict[str, Array]:
         if not known.size or (known % 1.0 != 0.0).any():
             continue
         if np.median(np.abs(known)) < _HIGH:
-            raise DataError(
+            raise raw.fault(
                 "io.height-unit-open",
-                file=raw.name,
-                quantity=quantity,
+                quantity,
                 of_what=quantity,
                 source=one.source,
                 height=float(known[0]),

@@ -20,20 +20,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
-from strapdown.formats.crash_record import (
-    LONGEST_NAME,
-    CrashChannel,
-    CrashRecord,
-    clean,
-    unique,
-)
+from strapdown.formats.crash_record import LONGEST_NAME, CrashChannel, CrashRecord, clean, unique
 from strapdown.formats.crash_samples import Clock, seconds_of
 from strapdown.formats.crash_table import MOST_REMARKS, NOTE, ChannelName, channel_name
 from strapdown.units import FACTORS, OF_CRASHES, SPEEDS, TIME_UNITS, find_unit, unit_words
-
-__all__ = ["DELTA_V_RANGE", "KMH", "detect", "element_of", "read", "rounding"]
 
 Array = NDArray[np.float64]
 
@@ -466,7 +458,12 @@ def _numbered(tables: list[_Table]) -> list[_Table]:
     """
     if any(t.event for t in tables):
         return [t if t.event else replace(t, event=1) for t in tables]
-    crash = [k for k, t in enumerate(tables) if _is_of_crash(t)]
+    moves = {"velocity", "acceleration"}
+    crash = [
+        k
+        for k, t in enumerate(tables)
+        if moves & {c.said.quantity for c in t.columns if c.said.axis}
+    ]
     others = [k for k in range(len(tables)) if k not in crash]
     events = _groups(tables, crash)
     out = list(tables)
@@ -478,11 +475,6 @@ def _numbered(tables: list[_Table]) -> list[_Table]:
         known = len(others) == len(events)
         out[m] = replace(out[m], event=k + 1 if known or not events else 0)
     return out
-
-
-def _is_of_crash(table: _Table) -> bool:
-    kinds = {c.said.quantity for c in table.columns if c.said.axis}
-    return bool(kinds & {"velocity", "acceleration"})
 
 
 def _groups(tables: list[_Table], crash: list[int]) -> list[list[int]]:
@@ -509,16 +501,8 @@ def _groups(tables: list[_Table], crash: list[int]) -> list[list[int]]:
 def read(path: Path) -> CrashRecord:
     """Read the tables of an event data recorder.
 
-    Returns
-    -------
-    CrashRecord
-        A channel for each column, under its heading; of the tables of one event the same `event`.
-        Columns of one quantity in two units are one channel where they agree within their rounding.
-
-    Raises
-    ------
-    DataError
-        The text holds no such table, or its stamps do not advance.
+    A channel for each column, under its heading; of the tables of one event the same `event`.
+    Columns of one quantity in two units are one channel where they agree within their rounding.
     """
     text, findings = csv.decoded(path.read_bytes(), path.name)
     found = _tables(text)
@@ -606,17 +590,16 @@ def _one_unit(table: _Table, file: str, findings: list[Finding]) -> _Table:
             data: dict[str, Any] = {"name": a.heading, "other": b.heading}
             if apart.size and apart.max() > limit:
                 k = int(np.argmax(apart))
-                findings.append(
-                    Finding(
-                        "io.edr-units-disagree",
-                        file=file,
-                        row=int(table.rows[k]),
-                        quantity="unit",
-                        value=float(x[k]),
-                        value_2=float(y[k]),
-                        unit=_si(a),
-                        **data,
-                    )
+                add_warning(
+                    findings,
+                    "io.edr-units-disagree",
+                    file=file,
+                    row=int(table.rows[k]),
+                    quantity="unit",
+                    value=float(x[k]),
+                    value_2=float(y[k]),
+                    unit={"acceleration": "m/s²", "rate": "rad/s"}.get(a.said.quantity, "m/s"),
+                    **data,
                 )
                 continue
             fine = rounding(a.values) * _factor(a) <= rounding(b.values) * _factor(b)
@@ -624,14 +607,8 @@ def _one_unit(table: _Table, file: str, findings: list[Finding]) -> _Table:
             gone.add(id(coarse))
             data["name"] = (b if coarse is a else a).heading
             data["other"] = coarse.heading
-            findings.append(
-                Finding("io.edr-two-units", file=file, severity="note", quantity="unit", **data)
-            )
+            add_note(findings, "io.edr-two-units", file=file, quantity="unit", **data)
     return replace(table, columns=tuple(c for c in table.columns if id(c) not in gone))
-
-
-def _si(column: _Column) -> str:
-    return {"acceleration": "m/s²", "rate": "rad/s"}.get(column.said.quantity, "m/s")
 
 
 def _factor(column: _Column) -> float:
@@ -648,12 +625,12 @@ def _compared(a: _Column, b: _Column) -> tuple[Array, Array, Array, float]:
 
 def _of_lines(text: _Text, file: str) -> list[Finding]:
     """Findings of labels and values: an incomplete file, a maximum that the table does not have."""
-    findings = []
+    findings: list[Finding] = []
     for line, event in text.above:
         label, _, value = line.rpartition(",")
         lower = label.lower()
         if "complete file" in lower and value.strip().lower() in _OFF:
-            findings.append(Finding("io.edr-not-complete", file=file, quantity="complete file"))
+            add_warning(findings, "io.edr-not-complete", file=file, quantity="complete file")
         axis = next((a for a in ("longitudinal", "lateral") if a in lower), "")
         units = _units_of(label)
         unit = (
@@ -700,7 +677,7 @@ def _of_maximum(
 
 def _of_table(table: _Table, file: str) -> list[Finding]:
     """Findings of delta-V: at the end of the range, or still changing where the table ends."""
-    findings = []
+    findings: list[Finding] = []
     factor = TIME_UNITS.get(table.clock.said.unit, math.nan)
     time = table.clock.values * factor
     for column in table.columns:
@@ -714,28 +691,26 @@ def _of_table(table: _Table, file: str) -> list[Finding]:
         largest = float(np.abs(v).max())
         at_end = np.flatnonzero(np.abs(v) >= largest - 0.5 * step) if step else np.array([], int)
         if largest >= DELTA_V_RANGE - 0.5 * max(step, KMH) and at_end.size > 1:
-            findings.append(
-                Finding(
-                    "io.edr-at-range-end",
-                    **where,
-                    row=int(table.rows[there][at_end[0]]),
-                    axis=said.axis.lstrip("-"),
-                    reached=largest / KMH,
-                    count=at_end.size,
-                )
+            add_warning(
+                findings,
+                "io.edr-at-range-end",
+                **where,
+                row=int(table.rows[there][at_end[0]]),
+                axis=said.axis.lstrip("-"),
+                reached=largest / KMH,
+                count=at_end.size,
             )
         late = np.flatnonzero(time[there] >= time[there][-1] - 1.01 * END_SPAN)
         if v.size > 2 and late.size > 1:
             change = abs(float(v[-1] - v[late[0]]))
             if change > END_CHANGE + step:
-                findings.append(
-                    Finding(
-                        "io.edr-ends-in-event",
-                        **where,
-                        row=int(table.rows[there][-1]),
-                        axis=said.axis.lstrip("-"),
-                        end=float(time[there][-1]),
-                        change=change / KMH,
-                    )
+                add_warning(
+                    findings,
+                    "io.edr-ends-in-event",
+                    **where,
+                    row=int(table.rows[there][-1]),
+                    axis=said.axis.lstrip("-"),
+                    end=float(time[there][-1]),
+                    change=change / KMH,
                 )
     return findings

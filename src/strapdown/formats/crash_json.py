@@ -24,8 +24,6 @@ from strapdown.formats.signs import Signs
 
 Array = NDArray[np.float64]
 
-__all__ = ["detect", "read", "write_crash_json"]
-
 FORMAT = "strapdown crash record"
 VERSION = 1
 LARGEST = 1_000_000_000
@@ -57,9 +55,8 @@ def write_crash_json(path: str | Path, record: CrashRecord) -> None:
         if bad.size:
             raise DataError(
                 "io.not-finite-number",
-                file=channel.file or None,
+                **channel.where,
                 row=channel.row(int(bad[0])),
-                quantity=f"channel {channel.name}",
                 values=values[bad[0]],
             )
         key = time.tobytes()
@@ -85,13 +82,7 @@ detect = Signs(first=rb"\A\s*+\{.{0,180}?" + FORMAT.encode())
 
 
 def read(path: Path) -> CrashRecord:
-    """Read a record written as JSON.
-
-    Raises
-    ------
-    DataError
-        The file is truncated, or has another structure.
-    """
+    """Read a record written as JSON."""
     whole = _parsed(path)
     stamps = [
         _numbers(s, path, f"stamps_s {k}") for k, s in enumerate(_list(whole, "stamps_s", path))

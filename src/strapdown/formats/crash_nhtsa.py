@@ -29,9 +29,6 @@ from strapdown.formats.nhtsa import KINDS, Channel, CrashTest, Vehicle, read_nht
 from strapdown.tables import imu_table
 from strapdown.units import find_unit, si_of
 
-__all__ = ["accelerations", "code_of_place", "imu_of", "read"]
-
-
 Array = NDArray[np.float64]
 
 _CODES = tomllib.loads(Path(__file__).with_name("nhtsa_codes.toml").read_text(encoding="utf-8"))
@@ -60,20 +57,15 @@ _STATUS = _CODES["status"]
 def read(path: Path) -> CrashRecord:
     """Read a test; samples are read when a channel is used.
 
-    Parameters
-    ----------
-    path : Path
-        The header, or its folder.
-
-    Returns
-    -------
-    CrashRecord
-        With the channels whose files exist.
+    `path`: the header, or its folder. With the channels whose files exist.
     """
     test = read_nhtsa(path)
     there = [c for c in test.channels if c.path is not None]
     vehicles = {v.number for v in test.vehicles} or {c.vehicle for c in there} - {0}
     points = _points(there, vehicles)
+    # The only vehicle met a rigid barrier.
+    rigid = [fields[0].upper() for fields in test.barrier if fields] == ["R"]
+    against = {"against": "barrier"} if rigid and len(test.vehicles) == 1 else {}
     dummies = {
         (fields[0], fields[1]): _DUMMIES.get((fields[2], fields[8]), "")
         for fields in test.occupants
@@ -90,7 +82,7 @@ def read(path: Path) -> CrashRecord:
         ),
         files=(test.path, *(c.path for c in there if c.path is not None)),
         findings=(*test.findings, *_unknown_codes(there, test.path)),
-        vehicles={str(v.number): _stated(_vehicle(v) | _against(test)) for v in test.vehicles},
+        vehicles={str(v.number): _stated(_vehicle(v) | against) for v in test.vehicles},
     )
 
 
@@ -108,12 +100,6 @@ def _facts(test: CrashTest) -> dict[str, str]:
             "impact angle, deg": _plain(test.impact_angle_deg),
         }
     )
-
-
-def _against(test: CrashTest) -> dict[str, str]:
-    """Whether the only vehicle met a rigid barrier."""
-    rigid = [fields[0].upper() for fields in test.barrier if fields] == ["R"]
-    return {"against": "barrier"} if rigid and len(test.vehicles) == 1 else {}
 
 
 def _stated(facts: dict[str, str]) -> dict[str, str]:

@@ -15,23 +15,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.tables import SAMPLINGS
-
-__all__ = [
-    "CHANGE_NOTE",
-    "DEFORMS",
-    "LONGEST_NAME",
-    "LONGEST_TEXT",
-    "QUANTITIES",
-    "CrashChannel",
-    "CrashRecord",
-    "attributes_of",
-    "check_attributes",
-    "clean",
-    "compact",
-    "position_of",
-    "unique",
-]
-
+from strapdown.tables.checks import IMPOSSIBLE_FORCE, IMPOSSIBLE_RATE
 
 Array = NDArray[np.float64]
 
@@ -134,6 +118,11 @@ class CrashChannel:
     dummy: str = ""
 
     @property
+    def where(self) -> dict[str, Any]:
+        """Location of the channel, for findings."""
+        return {"file": self.file or None, "quantity": f"channel {self.name}"}
+
+    @property
     def failure(self) -> str:
         """Remark by which the laboratory says that the channel failed; empty if none."""
         return next((r for r in self.remarks if any(f in r.lower() for f in _FAILED)), "")
@@ -195,10 +184,6 @@ class CrashRecord:
 # Values that no sensor reads.
 
 
-# Upper limits of any rate and specific force; squares of larger ones soon overflow a double. A
-# shell is fired with 1e6 m/s².
-IMPOSSIBLE_RATE = 1e6  # rad/s
-IMPOSSIBLE_FORCE = 1e8  # m/s²
 #: Of a channel whose unit is not known: beyond the limits in any of the known units.
 IMPOSSIBLE_NUMBER = 1e12
 
@@ -215,9 +200,8 @@ def refuse_impossible(channel: CrashChannel, values: NDArray[Any]) -> None:
     if beyond.size:
         raise DataError(
             "io.crash-value-impossible",
-            file=channel.file or None,
+            **channel.where,
             row=channel.row(int(beyond[0])),
-            quantity=f"channel {channel.name}",
             value=float(values[beyond[0]]),
             unit=unit,
             count=int(beyond.size),
@@ -243,10 +227,7 @@ def header_of(path: Path, suffix: str, several: str, none: str) -> Path:
     if len(headers) != 1:
         held = ", ".join(clean(p.name, LONGEST_NAME) for p in headers[:6])
         raise DataError(
-            several if headers else none,
-            file=path.resolve().name,
-            count=len(headers),
-            held=held,
+            several if headers else none, file=path.resolve().name, count=len(headers), held=held
         )
     return headers[0]
 

@@ -16,17 +16,6 @@ from strapdown.formats.crash_record import CrashRecord, clean
 from strapdown.formats.crash_table import record_of
 from strapdown.formats.signs import Signs
 
-__all__ = [
-    "CRASH_READERS",
-    "CrashReader",
-    "detect",
-    "files_named",
-    "read",
-    "read_crash_record",
-    "stated_format",
-]
-
-
 # Logs of inertial sensors as crash records: arrays, phones, MATLAB, HDF5.
 
 
@@ -51,13 +40,7 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> CrashRecord:
-    """Read a log of another format.
-
-    Raises
-    ------
-    DataError
-        The file is damaged, or of none of these formats.
-    """
+    """Read a log of another format."""
     from strapdown.formats import READERS, read_raw
 
     for key in LOGS:
@@ -106,7 +89,7 @@ class CrashReader:
     module: str
 
     def read(self, path: Path) -> CrashRecord:
-        """Read a record of this format."""
+        """Read a record of this format. DataError: the file is damaged, or not as its format."""
         record: CrashRecord = import_module(f"strapdown.formats.{self.module}").read(path)
         return record
 
@@ -230,16 +213,12 @@ def read_crash_record(
         ) from error
 
 
-def _names_beside(file: Path) -> list[str]:
-    try:
-        return sorted(p.name for p in islice(file.absolute().parent.iterdir(), MOST_NAMES))
-    except OSError:
-        return []
-
-
 def _read(file: Path, form: str | None) -> CrashRecord:
     if not file.exists():
-        near = difflib.get_close_matches(file.name, _names_beside(file), n=1)
+        beside: list[str] = []
+        with suppress(OSError):
+            beside = sorted(p.name for p in islice(file.absolute().parent.iterdir(), MOST_NAMES))
+        near = difflib.get_close_matches(file.name, beside, n=1)
         raise ConfigError(
             "io.no-such-record-but-near" if near else "io.no-such-record",
             file=clean(str(file)),

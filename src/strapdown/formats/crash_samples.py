@@ -9,24 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.crash_record import CrashChannel
 from strapdown.formats.inference.conclusion import infer_time_unit
 from strapdown.formats.triad_units import what_numbers_say
 from strapdown.units import TIME_UNITS
-
-__all__ = [
-    "Clock",
-    "last_midnight",
-    "mean_acceleration",
-    "mean_accelerations_of",
-    "means_from_zero",
-    "of_start",
-    "past_midnight",
-    "seconds_of",
-]
-
 
 Array = NDArray[np.float64]
 
@@ -37,17 +25,8 @@ DAY = 86_400.0  # s
 class Clock:
     """A column of stamps, as recorded.
 
-    Attributes
-    ----------
-    name : str
-        Name of the column.
-    stamps : ndarray, (n,)
-        Integer or not, as recorded.
-    unit : str
-        A key of `TIME_UNITS`, or empty if not stated.
-    file : str
-    row : callable
-        Maps the number of a stamp to its row in the file.
+    `name`: name of the column. `stamps` ((n,)): integer or not, as recorded. `unit`: a key of
+    `TIME_UNITS`, or empty if not stated. `row`: maps the number of a stamp to its row in the file.
     """
 
     name: str
@@ -97,15 +76,13 @@ def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
     if abs(float(stamps[0])) * factor <= EPOCH:
         return stamps.astype(np.float64) * factor, findings
     midnight = last_midnight(stamps[0].item(), factor)
-    findings.append(
-        Finding(
-            "io.crash-time-from-midnight",
-            file=clock.file,
-            quantity=f"time ({clock.name})",
-            severity="note",
-            midnight=midnight,
-            unit=unit,
-        )
+    add_note(
+        findings,
+        "io.crash-time-from-midnight",
+        file=clock.file,
+        quantity=f"time ({clock.name})",
+        midnight=midnight,
+        unit=unit,
     )
     return (stamps - midnight).astype(np.float64) * factor, findings
 
@@ -235,7 +212,7 @@ def means_from_zero(time: ArrayLike, velocity: ArrayLike, channel: CrashChannel)
     """
     t = np.asarray(time, dtype=np.float64)
     v = np.asarray(velocity, dtype=np.float64)
-    where: dict[str, Any] = {"file": channel.file or None, "quantity": f"channel {channel.name}"}
+    where = channel.where
     if t.size < 2:
         raise DataError("io.sample-no-change-velocity", size=t.size, **where)
     step = float(np.median(np.diff(t)))
@@ -264,13 +241,13 @@ def means_from_zero(time: ArrayLike, velocity: ArrayLike, channel: CrashChannel)
 
 def of_start(found: FromZero, channel: CrashChannel, unit: float = 1.0) -> list[Finding]:
     """Findings of a table that begins late, or not at zero; `unit`: factor to m/s."""
-    where: dict[str, Any] = {"file": channel.file or None, "quantity": f"channel {channel.name}"}
-    findings = []
+    where = channel.where
+    findings: list[Finding] = []
     if found.late:
-        findings.append(Finding("io.delta-v-begins-late", **where, first=found.late))
+        add_warning(findings, "io.delta-v-begins-late", **where, first=found.late)
     if found.offset:
         offset = found.offset * unit * 3.6
-        findings.append(Finding("io.delta-v-offset-at-start", **where, offset=offset))
+        add_warning(findings, "io.delta-v-offset-at-start", **where, offset=offset)
     return findings
 
 

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
 from strapdown.formats.arrays import day_nanoseconds, numbers, ticks_of
 from strapdown.formats.columns import read_name
@@ -34,18 +34,6 @@ from strapdown.formats.recording import RawLog
 from strapdown.formats.vocabularies import CRASHES
 from strapdown.units import FACTORS, OF_CRASHES, find_unit
 
-__all__ = [
-    "NOTE",
-    "ChannelName",
-    "channel_name",
-    "notes_of",
-    "read",
-    "read_text_table",
-    "record_of",
-    "write_crash_csv",
-]
-
-
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
@@ -63,18 +51,10 @@ _OF_TRIAD = {"gyro": "rate", "accel": "acceleration", "mag": "other"}
 class ChannelName:
     """Content of a column name.
 
-    Attributes
-    ----------
-    quantity : str
-        A key of `crash_record.QUANTITIES`.
-    axis : str
-        ``x y z``, with a minus if the name states it, or empty.
-    unit : str
-        In the spelling of this package, as in the name if unknown, or empty.
-    change : bool
-        For a velocity: the name states a change since time zero.
-    contradiction : str
-        Part of the name that contradicts the unit, or empty.
+    `quantity`: a key of `crash_record.QUANTITIES`. `axis`: ``x y z``, with a minus if the name
+    states it, or empty. `unit`: in the spelling of this package, as in the name if unknown, or
+    empty. `change`: for a velocity: the name states a change since time zero. `contradiction`: part
+    of the name that contradicts the unit, or empty.
     """
 
     quantity: str
@@ -87,15 +67,7 @@ class ChannelName:
 def read(path: Path) -> CrashRecord:
     """Read a text table.
 
-    Returns
-    -------
-    CrashRecord
-        One channel for each numeric column, under its name.
-
-    Raises
-    ------
-    DataError
-        The file is not a table, or is damaged.
+    One channel for each numeric column, under its name.
     """
     raw, notes, title, remarks = read_text_table(path)
     return record_of(raw, path, "csv", notes=notes, title=title, remarks=remarks)
@@ -112,19 +84,8 @@ def record_of(
 ) -> CrashRecord:
     """Make a record from the columns of a log.
 
-    Parameters
-    ----------
-    form : str
-        Key of the format.
-    notes : dict of str to dict, optional
-        Metadata of columns stated in the file, as from `attributes_of`.
-    remarks : tuple of str, optional
-        Lines above the table.
-
-    Raises
-    ------
-    DataError
-        No column is numeric.
+    `form`: key of the format. `notes`: metadata of columns stated in the file, as from
+    `attributes_of`. `remarks`: lines above the table. DataError: no column is numeric.
     """
     findings = list(raw.findings)
     kept: list[str] = []
@@ -133,11 +94,9 @@ def record_of(
         (kept if _is_numeric(raw, source) else texts).append(source)
     if texts:
         shown = ", ".join(clean(t, 40) for t in texts[:6]) + (" …" if len(texts) > 6 else "")
-        findings.append(
-            Finding("io.columns-text-left-out", file=raw.name, severity="note", value_shown=shown)
-        )
+        add_note(findings, "io.columns-text-left-out", file=raw.name, value_shown=shown)
     if not kept:
-        raise DataError("io.no-numeric-column", file=raw.name)
+        raise raw.fault("io.no-numeric-column")
     notes = notes or {}
     names = unique(
         [
@@ -235,28 +194,25 @@ def _clock(
     stated = [s for s in times if said[s].unit] or times
     if len(stated) > 1:
         others = ", ".join(names[s] for s in stated[1:])
-        findings.append(
-            Finding(
-                "io.taken-time-could-too",
-                file=raw.name,
-                quantity="time",
-                names=names[stated[0]],
-                others=others,
-                names_2=names[stated[1]],
-            )
+        add_warning(
+            findings,
+            "io.taken-time-could-too",
+            file=raw.name,
+            quantity="time",
+            names=names[stated[0]],
+            others=others,
+            names_2=names[stated[1]],
         )
     if stated:
         return stated[0]
     first = next(iter(said))
     if _advances(raw.columns[first]) and said[first].quantity == "other" and len(said) > 1:
-        findings.append(
-            Finding(
-                "io.advances-evenly-taken-time",
-                severity="note",
-                file=raw.name,
-                quantity="time",
-                names=names[first],
-            )
+        add_note(
+            findings,
+            "io.advances-evenly-taken-time",
+            file=raw.name,
+            quantity="time",
+            names=names[first],
         )
         return first
     return ""
@@ -275,12 +231,7 @@ def _advances(values: NDArray[Any]) -> bool:
 
 
 def _channel(
-    raw: RawLog,
-    source: str,
-    name: str,
-    names: dict[str, ChannelName],
-    clock: str,
-    clock_name: str,
+    raw: RawLog, source: str, name: str, names: dict[str, ChannelName], clock: str, clock_name: str
 ) -> CrashChannel:
     said = names[source]
     if _begins_from_rest(raw, source, said, clock):
@@ -360,7 +311,7 @@ def _stamps(raw: RawLog, clock: str, stated: str) -> Callable[[], Array]:
             if raw.rate:
                 count = len(next(iter(raw.columns.values())))
                 return np.arange(count, dtype=np.float64) / raw.rate
-            raise DataError("io.crash-time-column-missing", file=raw.name, quantity="time")
+            raise raw.fault("io.crash-time-column-missing", "time")
         stamps, dated = _ticks(raw, clock)
         unit = "ns" if dated else stated
         return seconds_of(Clock(clock, stamps, unit, raw.name, raw.row))[0]
@@ -378,9 +329,7 @@ LARGEST = 2_000_000_000
 _TITLE = "# title: "
 
 
-def read_text_table(
-    path: Path,
-) -> tuple[RawLog, dict[str, dict[str, Any]], str, tuple[str, ...]]:
+def read_text_table(path: Path) -> tuple[RawLog, dict[str, dict[str, Any]], str, tuple[str, ...]]:
     """Read a text table whose header may be below the first line.
 
     Returns : `units` are those of the row of units, if there is one; : metadata of columns from
@@ -431,14 +380,10 @@ def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
             notes[names[column - 1]] = checked
         except (DataError, ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
             reason = error.finding if isinstance(error, DataError) else None
-            raw.findings.append(
-                Finding(
-                    "io.comment-of-no-channel" if reason is None else "io.comment-left-out",
-                    file=raw.name,
-                    row=row,
-                    severity="note",
-                    reason=reason,
-                )
+            raw.note(
+                "io.comment-of-no-channel" if reason is None else "io.comment-left-out",
+                row=row,
+                reason=reason,
             )
     return notes
 

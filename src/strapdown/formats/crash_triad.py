@@ -10,14 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.clocks import EPOCH
-from strapdown.formats.crash_record import (
-    QUANTITIES,
-    CrashChannel,
-    CrashRecord,
-    refuse_impossible,
-)
+from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord, refuse_impossible
 from strapdown.formats.crash_samples import Clock, last_midnight, past_midnight, seconds_of
 from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.triad_units import what_numbers_say
@@ -26,9 +21,6 @@ from strapdown.units import FACTORS, OF_CRASHES, TIME_UNITS, find_unit
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["state_unit", "triad_factor", "triad_of_channels", "triad_stamps"]
-
 
 Array = NDArray[np.float64]
 
@@ -173,14 +165,8 @@ def _tell_axis(channel: CrashChannel, axis: str, sign: float, findings: list[Fin
         return
     taken = f"{'-' if sign < 0 else ''}{axis}"
     if channel.axis != taken:
-        findings.append(
-            Finding(
-                "io.record-along-taken-along",
-                file=channel.file or None,
-                quantity=f"channel {channel.name}",
-                axis=channel.axis,
-                taken=taken,
-            )
+        add_warning(
+            findings, "io.record-along-taken-along", **channel.where, axis=channel.axis, taken=taken
         )
 
 
@@ -210,21 +196,13 @@ def _as_mean(
     from strapdown.formats.crash_samples import mean_accelerations_of, means_from_zero, of_start
 
     if stamps.size < 2:
-        raise DataError(
-            "io.sample-no-change-velocity",
-            file=channel.file or None,
-            quantity=f"channel {channel.name}",
-            size=stamps.size,
-        )
+        raise DataError("io.sample-no-change-velocity", **channel.where, size=stamps.size)
     _check_finite(channel, stamps, values)
     from_zero = channel.from_zero
-    findings.append(
-        Finding(
-            "io.velocity-made-means-from-zero" if from_zero else "io.velocity-made-means",
-            file=channel.file or None,
-            quantity=f"channel {channel.name}",
-            severity="note",
-        )
+    add_note(
+        findings,
+        "io.velocity-made-means-from-zero" if from_zero else "io.velocity-made-means",
+        **channel.where,
     )
     if not from_zero:
         return mean_accelerations_of(stamps, values)
@@ -235,11 +213,7 @@ def _as_mean(
 
 def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:
     if not values.size:
-        raise DataError(
-            "io.channel-without-samples",
-            file=channel.file or None,
-            quantity=f"channel {channel.name}",
-        )
+        raise DataError("io.channel-without-samples", **channel.where)
     refuse_impossible(channel, values)
     there = np.flatnonzero(np.isfinite(values))
     endless = np.flatnonzero(np.isinf(values))
@@ -258,9 +232,8 @@ def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:
     count = int((~np.isfinite(values)).sum())
     raise DataError(
         "io.not-finite-number-such",
-        file=channel.file or None,
+        **channel.where,
         row=channel.row(hole),
-        quantity=f"channel {channel.name}",
         values=values[hole],
         stamps=stamps[hole],
         count=count,
@@ -282,13 +255,11 @@ def _sampling(
             stated=stated,
         )
     if not kinds and stated is None:
-        findings.append(
-            Finding(
-                "io.crash-sampling-taken-as-instantaneous",
-                severity="note",
-                file=record.path.name,
-                quantity="sampling",
-            )
+        add_note(
+            findings,
+            "io.crash-sampling-taken-as-instantaneous",
+            file=record.path.name,
+            quantity="sampling",
         )
     return stated or (str(kinds.pop()) if kinds else "instantaneous")
 
@@ -350,7 +321,9 @@ def triad_stamps(
     values = channel.samples() if channel.samples is not None else channel.load()[1]
     values = np.asarray(values, dtype=np.float64)
     if rate_hz is None:
-        return _same_length(channel, *_stated(record, name, time_unit, findings), values)
+        seconds, told = seconds_of(_clock_of(record, name, time_unit))
+        findings += told
+        return _same_length(channel, seconds, name, values)
     if time is None and name and channel.samples is not None:
         steps = np.diff(_clock_of(record, name, time_unit).stamps.astype(np.float64))
         # Stamps that decrease, or change only once, are not a clock: samples are counted from zero.
@@ -383,22 +356,13 @@ def _clock_of(record: CrashRecord, name: str, time_unit: str | None) -> Clock:
     return Clock(name, stamps, unit, held.file or record.path.name, held.row)
 
 
-def _stated(
-    record: CrashRecord, name: str, time_unit: str | None, findings: list[Finding]
-) -> tuple[Array, str]:
-    seconds, told = seconds_of(_clock_of(record, name, time_unit))
-    findings += told
-    return seconds, name
-
-
 def _same_length(
     channel: CrashChannel, stamps: Array, name: str, values: Array
 ) -> tuple[Array, Array]:
     if stamps.size != values.size:
         raise DataError(
             "io.samples-channel-stamps",
-            file=channel.file or None,
-            quantity=f"channel {channel.name}",
+            **channel.where,
             size=values.size,
             name=name,
             size_2=stamps.size,
@@ -444,14 +408,12 @@ def _even(
                 rate_hz=rate_hz,
                 recorded=recorded,
             )
-        findings.append(
-            Finding(
-                "io.stamps-evenly-spaced-hz-first",
-                file=record.path.name,
-                quantity="time",
-                severity="note",
-                rate_hz=rate_hz,
-            )
+        add_note(
+            findings,
+            "io.stamps-evenly-spaced-hz-first",
+            file=record.path.name,
+            quantity="time",
+            rate_hz=rate_hz,
         )
     return start + count / rate_hz
 
@@ -540,30 +502,26 @@ def triad_factor(
             wanted = next(iter(own.values()))
             without = ", ".join(axes[a][0].name for a in open_axes)
             other = axes[next(iter(own))][0].name
-            findings.append(
-                Finding(
-                    "io.unit-taken-from-other-axis",
-                    file=record.path.name,
-                    quantity="unit",
-                    without=without,
-                    wanted=wanted,
-                    other=other,
-                )
+            add_warning(
+                findings,
+                "io.unit-taken-from-other-axis",
+                file=record.path.name,
+                quantity="unit",
+                without=without,
+                wanted=wanted,
+                other=other,
             )
         else:
             wanted = _evident(record, axes, time, kind, findings)
     for axis in open_axes:
         channel = axes[axis][0]
         if channel.unit:
-            findings.append(
-                Finding(
-                    "io.record-says-not-known-read",
-                    file=channel.file or None,
-                    quantity=f"channel {channel.name}",
-                    severity="note",
-                    unit=channel.unit,
-                    wanted=wanted,
-                )
+            add_note(
+                findings,
+                "io.record-says-not-known-read",
+                **channel.where,
+                unit=channel.unit,
+                wanted=wanted,
             )
     return {a: 1.0 if a in own else FACTORS[kind][wanted] for a in axes}, wanted
 
@@ -592,9 +550,7 @@ def _evident(
         if unit is not None and unit.settled and (form is None or form.value == "rate"):
             findings.append(
                 unit.finding(
-                    "io.crash-unit-inferred",
-                    file=record.path.name,
-                    quantity=f"unit of {names}",
+                    "io.crash-unit-inferred", file=record.path.name, quantity=f"unit of {names}"
                 )
             )
             return str(unit.value)

@@ -36,17 +36,6 @@ from strapdown.formats.mme_reader import (
 from strapdown.tables import ACCEL, EULER, GYRO, NED, POSITION_SD, VELOCITY
 from strapdown.units import GYRO_UNITS, si_of
 
-__all__ = [
-    "ACCEL_HEADINGS",
-    "GYRO_HEADINGS",
-    "TIME",
-    "write_mme",
-    "write_nhtsa",
-    "write_path_csv",
-    "write_recorder_csv",
-]
-
-
 Array = NDArray[np.float64]
 
 NOVALUE = "NOVALUE"
@@ -108,16 +97,7 @@ def write_mme(
     DataError
         The record has no channels, more than 999, or an infinite value.
     """
-    # A column of stamps is written together with the channels that use it.
-    channels = [c for c in record.channels if c.quantity != "time"]
-    if not channels or len(channels) > MOST_CHANNELS:
-        raise DataError(
-            "io.channels-iso-mme-holds",
-            file=record.path.name,
-            quantity="channels",
-            count=len(channels),
-            most_channels=MOST_CHANNELS,
-        )
+    channels = _written(record)
     stem = _FILE_NAME.sub("_", name if name is not None else record.path.stem).strip("_")
     stem = stem[:LONGEST_FILE_NAME] or _SHORTEST
     codes = _codes(channels)
@@ -145,15 +125,35 @@ def write_mme(
     return codes
 
 
+def _written(record: CrashRecord) -> list[CrashChannel]:
+    """Return the channels but those of stamps, which are written with the channels that use them.
+
+    DataError: there are none, or more than a test can number.
+    """
+    channels = [c for c in record.channels if c.quantity != "time"]
+    if not channels or len(channels) > MOST_CHANNELS:
+        raise DataError(
+            "io.channels-iso-mme-holds",
+            file=record.path.name,
+            quantity="channels",
+            count=len(channels),
+            most_channels=MOST_CHANNELS,
+        )
+    return channels
+
+
 def _codes(channels: list[CrashChannel]) -> dict[str, str]:
     """Assign a unique code to each channel; names that are codes are kept."""
     codes = {c.name: c.name for c in channels if _is_code(c.name)}
     taken = {code.upper() for code in codes.values()}
     points: dict[str, list[str]] = {}
+    letters = {words: letter for letter, words in FILTERS.items()}
     for channel in channels:
         if channel.name in codes:
             continue
-        start, end = _object_and_place(channel), _ending(channel)
+        start = _object_and_place(channel)
+        end = _DIMENSIONS[channel.quantity] + _DIRECTIONS.get(channel.axis, "0")
+        end += letters.get(channel.low_pass, NO_CLASS)
         # Points of one location differ in their numbers, whatever axes each has.
         of_start = points.setdefault(start, [])
         point = channel.point or position_of(channel.place)
@@ -181,20 +181,13 @@ def _object_and_place(channel: CrashChannel) -> str:
     return f"{'B' if body == 'barrier' else number}{seat}{main}"
 
 
-def _ending(channel: CrashChannel) -> str:
-    letters = {words: letter for letter, words in FILTERS.items()}
-    direction = _DIRECTIONS.get(channel.axis, "0")
-    return _DIMENSIONS[channel.quantity] + direction + letters.get(channel.low_pass, NO_CLASS)
-
-
 def _check(channel: CrashChannel, time: Array, values: Array) -> None:
     bad = np.flatnonzero(np.isinf(values) | ~np.isfinite(time))
     if bad.size or not values.size:
         raise DataError(
             "io.not-finite-number" if bad.size else "io.no-samples-2",
-            file=channel.file or None,
+            **channel.where,
             row=channel.row(int(bad[0])) if bad.size else None,
-            quantity=f"channel {channel.name}",
             values=values[bad[0]] if bad.size else None,
         )
 
@@ -373,15 +366,7 @@ def write_nhtsa(
         The record has no channels, more than 999, a value that is not finite, uneven stamps, or a
         channel on a moving part for which the database has no code.
     """
-    channels = [c for c in record.channels if c.quantity != "time"]
-    if not channels or len(channels) > MOST_CHANNELS:
-        raise DataError(
-            "io.channels-iso-mme-holds",
-            file=record.path.name,
-            quantity="channels",
-            count=len(channels),
-            most_channels=MOST_CHANNELS,
-        )
+    channels = _written(record)
     test = "".join(c for c in record.facts.get("test", "") if c.isdecimal())
     stem = _FILE_NAME.sub("_", name or f"v{int(test or 1):05d}").strip("_") or _SHORTEST
     numbers = _curves(channels)
@@ -412,15 +397,14 @@ def write_nhtsa(
     lines = [
         line
         for section, held in sections.items()
-        for line in (f"----- {section} -----", *("|".join(map(_field, row)) for row in held))
+        for line in (
+            f"----- {section} -----",
+            *("|".join(clean(t).replace("|", "/") for t in row) for row in held),
+        )
     ]
     head = "".join(f"{line}\n" for line in lines)
     (Path(folder) / f"{stem}.EV5").write_bytes(head.encode("latin-1", "replace"))
     return {name: str(number) for name, number in numbers.items()}
-
-
-def _field(text: str) -> str:
-    return clean(text).replace("|", "/")
 
 
 def _curves(channels: list[CrashChannel]) -> dict[str, int]:
@@ -451,21 +435,12 @@ def _ev5_channel(
     if np.isnan(values).any():
         k = int(np.flatnonzero(np.isnan(values))[0])
         raise DataError(
-            "io.not-finite-number",
-            file=channel.file or None,
-            row=channel.row(k),
-            quantity=f"channel {channel.name}",
-            values=values[k],
+            "io.not-finite-number", **channel.where, row=channel.row(k), values=values[k]
         )
     first, interval = _ev5_steps(channel, time)
     location, seat = code_of_place(channel.point, channel.body, channel.place)
     if not location:
-        raise DataError(
-            "io.part-without-location-code",
-            file=channel.file or None,
-            quantity=f"channel {channel.name}",
-            body=channel.body,
-        )
+        raise DataError("io.part-without-location-code", **channel.where, body=channel.body)
     kind, unit = _EV5_KINDS[channel.quantity]
     *_, factor = si_of(unit) or ("", 1.0)
     axis = channel.axis.lstrip("-").upper()
@@ -497,12 +472,7 @@ def _ev5_steps(channel: CrashChannel, time: Array) -> tuple[int, str]:
             off = np.abs(time - step * (first + np.arange(time.size)))
             if off.max() <= nhtsa.STAMP_ROUNDING:
                 return first, interval
-    raise DataError(
-        "io.stamps-not-even",
-        file=channel.file or None,
-        quantity=f"channel {channel.name}",
-        interval=mean,
-    )
+    raise DataError("io.stamps-not-even", **channel.where, interval=mean)
 
 
 def _ev5_test(record: CrashRecord, count: int) -> list[str]:

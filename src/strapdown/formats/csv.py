@@ -21,16 +21,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats.arrays import is_date, is_day_time, is_stamp
 from strapdown.formats.columns import UNKNOWN_WORDS, read_name, split_brackets
-from strapdown.formats.preamble import stated_by_keys, stated_rate, stated_units
 from strapdown.formats.recording import RawLog, stated_by
-from strapdown.formats.serial_text import one_line_a_sample, with_names
 from strapdown.formats.signs import HEAD, Signs, first_bytes
 from strapdown.formats.text_columns import NULLS, Columns, columns_at_once, parsed
 from strapdown.tables.on_disk import let_go
-from strapdown.units import OF_LOGS, unit_of
+from strapdown.units import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, OF_LOGS, unit_of
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
 COMMENTS = ("#", "%", "//", "!")
@@ -80,17 +78,8 @@ detect = Signs(named=SUFFIXES, also=_begins_with_rows)
 def read(path: Path) -> RawLog:
     """Read the columns of a text table.
 
-    Returns
-    -------
-    RawLog
-        Columns that hold anything but numbers are left as text. Lines at the top that begin
-        with ``#``, ``%``, ``//``, ``!`` or ``;`` are comments; the comment ``# sampling: mean`` is
-        understood.
-
-    Raises
-    ------
-    DataError
-        The file is empty, holds only a header, or is not text.
+    Columns that hold anything but numbers are left as text. Lines at the top that begin with ``#``,
+    ``%``, ``//``, ``!`` or ``;`` are comments; the comment ``# sampling: mean`` is understood.
     """
     files = (path,)
     return _at_once(path, path.name, files) or _line_by_line(path.read_bytes(), path.name, files)
@@ -127,8 +116,7 @@ def _at_once(
         return None
     if not text or "\0" in text or _BREAKS.search(text):
         return None
-    numbered, comments = _numbered(text)
-    _refuse_wide(numbered, name)
+    numbered, comments = _numbered(text, name)
     if not numbered or _rewritten(numbered) is not numbered:
         return None
     top = _Top(numbered, comments, name, kinds)
@@ -157,10 +145,9 @@ def _line_by_line(
     data: bytes, name: str, files: tuple[Path, ...], kinds: Sequence[str] = OF_LOGS
 ) -> RawLog:
     text, findings = decoded(data, name)
-    numbered, comments = _numbered(text)
+    numbered, comments = _numbered(text, name)
     if not numbered:
         raise DataError("io.file-holds-comments-alone" if comments else "io.file-empty", file=name)
-    _refuse_wide(numbered, name)
     top = _Top(_rewritten(numbered), comments, name, kinds)
     if not top.data:
         raise DataError("io.csv-without-rows", file=name, row=numbered[0][0])
@@ -172,19 +159,16 @@ def _line_by_line(
     return top.log(name, files, columns, np.array(rows), findings)
 
 
-def _numbered(text: str) -> tuple[Lines, list[str]]:
-    """Split into non-blank lines with their row numbers, and the comments at the top."""
+def _numbered(text: str, name: str = "") -> tuple[Lines, list[str]]:
+    """Split into non-blank lines with their row numbers, and the comments at the top.
+
+    `name`: for messages. DataError: one of the first lines has more than `MOST_COLUMNS` fields,
+    which no log has; no pattern is searched in it.
+    """
     numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
     comments = [line for _, line in itertools.takewhile(lambda n: is_comment(n[1]), numbered)]
-    return numbered[len(comments) :], comments
-
-
-def _refuse_wide(numbered: Lines, name: str) -> None:
-    """Refuse a line of more fields than a log has, before any pattern is searched in it.
-
-    DataError: one of the first lines has more than `MOST_COLUMNS` fields.
-    """
-    for row, line in numbered[:SEARCHED]:
+    numbered = numbered[len(comments) :]
+    for row, line in numbered[: SEARCHED if name else 0]:
         if len(line) < 2 * MOST_COLUMNS:
             continue
         count = 1 + max(line.count(separator) for separator in ",;\t|")
@@ -193,6 +177,7 @@ def _refuse_wide(numbered: Lines, name: str) -> None:
             raise DataError(
                 "io.csv-too-many-columns", file=name, row=row, count=count, most=MOST_COLUMNS
             )
+    return numbered, comments
 
 
 # Lines that are rows in another form.
@@ -326,6 +311,100 @@ def _by_axis(vector: re.Match[str]) -> str:
 ABOVE = 4
 
 
+# Texts of serial monitors: several lines a sample, as a board prints its sensors one below the
+# other, and sentences whose fields their maker defines.
+
+
+#: Most lines of a sample, and the longest line that is understood.
+MOST_TURNS, LONGEST_LABELLED = 8, 400
+#: Fewest labelled values of a line of a sensor, and lines of sensors of a sample.
+AXES, SENSORS = 3, 2
+_DECIMAL = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+# "Acceleration X: 0.08," and, at the end of a line, its unit: "Z: 9.83 m/s^2".
+_VALUE = re.compile(rf"\s*([A-Za-z][\w ]{{0,40}}?)\s*[:=]\s*({_DECIMAL})[ \t]*[,;|]?")
+_UNIT_BEHIND = re.compile(r"\s*([^\s\d,;|:=][^,;|:=]{0,20}?)\s*")
+
+
+def _labelled(line: str) -> tuple[tuple[str, ...], list[str]]:
+    """Return the names, with the unit at the end, and the values of a line; or its letters."""
+    values, end = [], 0
+    if len(line) <= LONGEST_LABELLED:
+        while m := _VALUE.match(line, end):
+            values.append((m[1], m[2]))
+            end = m.end()
+    rest = line[end:].strip()
+    unit = unit_of(m[1]) if (m := _UNIT_BEHIND.fullmatch(rest)) else None
+    if not values or (rest and unit is None):
+        return (re.sub(r"[^A-Za-z]", "", line[:LONGEST_LABELLED]),), []
+    # "Accel X: 1, Y: 2, Z: 3": the name is said once.
+    first, _, axis = values[0][0].rpartition(" ")
+    names = [
+        n if len(n) > 1 or not first or axis not in ("X", "x") else f"{first} {n}"
+        for n, _ in values
+    ]
+    return tuple(f"{n} [{unit}]" if unit else n for n in names), [v for _, v in values]
+
+
+def one_line_a_sample(numbered: Lines) -> Lines:
+    """Return lines of labelled values that come in turns as one row a sample, under their names.
+
+    The same object if they do not: a sample has two lines of three values at least, and each is
+    followed by the next.
+    """
+    said = [_labelled(line) for _, line in numbered[:SEARCHED]]
+    keys = [names for names, _ in said]
+    period = next(
+        (k for k in range(1, min(MOST_TURNS, len(keys) - 1) + 1) if keys[k] == keys[0]), 0
+    )
+    if period < SENSORS or len(keys) < 3 * period:
+        return numbered
+    turns = keys[:period]
+    sensors = [k for k, (_, values) in enumerate(said[:period]) if len(values) >= AXES]
+    regular = sum(key == turns[k % period] for k, key in enumerate(keys))
+    if len(sensors) < SENSORS or len(set(turns)) < period or 10 * regular < 9 * len(keys):
+        return numbered
+    held = [k for k in range(period) if said[k][1]]
+    out: Lines = [(numbered[0][0], "\t".join(name for k in held for name in turns[k]))]
+    sample: list[list[str]] = []
+    begin = 0
+    for row, line in numbered:
+        names, values = _labelled(line)
+        if names == turns[0]:
+            sample, begin = [], row
+        if len(sample) < period and names == turns[len(sample)]:
+            sample.append(values)
+        else:
+            sample = []  # a line is lost: the sample is not whole
+        if len(sample) == period:
+            out.append((begin, "\t".join(v for part in sample for v in part)))
+            sample = []
+    return out
+
+
+_SENSED = [
+    f"{name}_{axis} [{unit}]"
+    for name, unit in (("mag", "gauss"), ("accel", "m/s2"), ("gyro", "rad/s"))
+    for axis in "xyz"
+]
+_YAW = ["yaw [deg]", "pitch [deg]", "roll [deg]"]
+#: Fields of sentences (VectorNav, Interface Control Documents of VN-100 and VN-200).
+SENTENCES = {
+    "$VNIMU": [*_SENSED, "temperature", "pressure"],
+    "$VNYMR": [*_YAW, *_SENSED],
+    "$VNQMR": ["quat_x", "quat_y", "quat_z", "quat_w", *_SENSED],
+    "$VNMAR": _SENSED,
+    "$VNYBA": [*_YAW, *[f"linear {n}" for n in _SENSED[3:6]], *_SENSED[6:]],
+}
+
+
+def with_names(numbered: Lines, sentences: Sequence[str]) -> Lines:
+    """Put the names of its fields over the rows of one known sentence."""
+    names = SENTENCES.get(sentences[0]) if len(sentences) == 1 else None
+    if names is None or not numbered or numbered[0][1].count(",") != len(names):
+        return numbered
+    return [(numbered[0][0], ",".join(["sentence", *names])), *numbered]
+
+
 # The top of a table: where rows of numbers begin, and what the lines above them say.
 
 
@@ -335,15 +414,8 @@ class _Top:
     Lines above the names are a preamble. Two lines of names are a group and its members, as
     ``Gyroscope,,`` over ``x,y,z``.
 
-    Parameters
-    ----------
-    numbered : list of (int, str)
-        Lines with their rows, without the comments at the top.
-    comments : list of str
-    name : str
-        For messages.
-    kinds : sequence of str
-        Kinds of units that a row under the names may have.
+    `numbered`: lines with their rows, without the comments at the top. `name`: for messages.
+    `kinds`: kinds of units that a row under the names may have.
     """
 
     def __init__(
@@ -444,8 +516,98 @@ class _Top:
             rate=stated_rate(said),
             above=said,
             findings=findings,
-            **stated_by(stated_by_keys(said)),
+            # Comments of the form ``# key: value``, as strapdown writes them.
+            **stated_by({m[1]: m[2] for line in said if (m := _META.match(line))}),
         )
+
+
+# Sampling rate and units of sensors, stated in the lines above a table.
+
+
+_META = re.compile(r"(?:[#%]|//)\s*(\w+)\s*:\s*(.+?)\s*$")
+# "Sample Rate:,128,Hz", "// Update Rate: 100.0Hz", "Sampling frequency (Hz): 50", "ODR 100 Hz".
+_RATES = (
+    re.compile(
+        r"(?:sampl\w*|update|output|logging|data)[ _-]*(?:rate|freq\w*)"
+        r"(?:\s*[\[(]\s*Hz\s*[\])])?\W*(\d+(?:\.\d*)?)(?!\d|\s*[a-gi-z])",
+        re.I,
+    ),
+    re.compile(r"\b(?:fs|odr)\b\W*(\d+(?:\.\d*)?)\s*Hz\b", re.I),
+)
+_STEP = re.compile(r"\bdt\s*=\s*(\d*\.?\d+(?:e-?\d+)?)\s*s\b", re.I)
+_NAME_OF_SENSOR = re.compile(
+    r"(?P<gyro>gyro(?:scopes?|s)?|ang(?:ular)?[ _-]?(?:rate|vel(?:ocity)?)s?|(?:rotation|turn)"
+    r"[ _-]?rates?)|(?P<accel>acc(?:el(?:eration|erometer)?s?)?|specific[ _-]force)"
+    r"|(?P<mag>mag(?:netometer|netic[ _-]?field|n)?)",
+    re.I,
+)
+_IN = re.compile(
+    r"[\s:=(\[]*(?:\b(?:units?|in|is|are|data|values?)\b[\s:=(\[]*)*"
+    r"([^\s,;)\]]+(?:[ ]s\^?(?:-|−|⁻)(?:\d|[¹²]))?)",
+    re.I,
+)
+_COUNT = r"(?:LSBs?|counts?|digits?)"
+_PER_UNIT = re.compile(rf"(\d+(?:\.\d*)?)\s*{_COUNT}\s*(?:/|per)\s*\(?([^\s,;)]+)", re.I)
+_PER_COUNT = re.compile(rf"(\d*\.?\d+)\s*([^\s\d,;(]+?)\s*(?:/|per)\s*{_COUNT}", re.I)
+_RANGE = re.compile(r"(?:±|\+/?-|_FS[_=]?)\s*(\d+)\s*([^\s,;)]*)", re.I)
+_16_BIT = re.compile(r"\bint16|\b16[ -]?bit", re.I)
+_KNOWN = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "mag": MAG_UNITS}
+#: Unit of a range that is stated without, as in the names of registers.
+_OF_RANGE = {"gyro": "deg/s", "accel": "g"}
+
+
+def stated_rate(above: list[str]) -> float | None:
+    """Return the sampling rate (Hz) that lines above a table state."""
+    rates = [float(m[1]) for line in above for form in _RATES if (m := form.search(line))]
+    rates += [1.0 / float(m[1]) for line in above if (m := _STEP.search(line)) and float(m[1])]
+    return rates[0] if rates and rates[0] > 0.0 else None
+
+
+def stated_units(above: list[str], columns: dict[str, NDArray[Any]]) -> dict[str, str]:
+    """Return the unit of each sensor that lines above a table state.
+
+    ``gyro: deg/s``; counts by ``131 LSB/(deg/s)``, ``0.061 mg/LSB``, or by a range of 16 bits:
+    ``±250 deg/s … 16 bit``. Counts are whole numbers; a range says no unit of others.
+    """
+    text = "\n".join(above)
+    out: dict[str, str] = {}
+    for line in above:
+        found = [*_NAME_OF_SENSOR.finditer(line)]
+        for this, after in itertools.zip_longest(found, found[1:]):
+            triad = str(this.lastgroup)
+            rest = line[this.end() : after.start() if after else None]
+            if line[this.end() : this.end() + 1].isalpha() or triad in out:
+                continue
+            unit = _counts(triad, rest, bool(_16_BIT.search(text)))
+            if unit is not None and not _are_counts(triad, columns):
+                continue
+            said = unit_of(m[1].strip(".:")) if (m := _IN.match(rest)) else None
+            if unit or said in _KNOWN[triad]:
+                out[triad] = unit or str(said)
+    return out
+
+
+def _counts(triad: str, text: str, of_16_bits: bool) -> str | None:
+    """Return the unit of raw counts that a text states."""
+    if m := _PER_UNIT.search(text):
+        scale, unit = f"/{m[1]}", unit_of(m[2])
+    elif m := _PER_COUNT.search(text):
+        return f"{m[1]} {of}" if (of := unit_of(m[2])) in _KNOWN[triad] else None
+    elif of_16_bits and triad in _OF_RANGE and (m := _RANGE.search(text)) and int(m[1]):
+        # Names of registers have no unit.
+        default = _OF_RANGE[triad] if m[0].upper().startswith("_FS") else None
+        scale, unit = f"/{32768 / int(m[1]):g}", unit_of(m[2]) or default
+    else:
+        return None
+    return f"{unit}{scale}" if unit in _KNOWN[triad] else None
+
+
+def _are_counts(triad: str, columns: dict[str, NDArray[Any]]) -> bool:
+    """Whether the columns of a sensor, as far as their names say it, are whole numbers."""
+    held = [c for n, c in columns.items() if str(read_name(n).quantity).startswith(triad)]
+    return all(
+        c.dtype.kind in "iuf" and bool(np.all(~np.isfinite(c) | (c == np.rint(c)))) for c in held
+    )
 
 
 #: Beginning of a name, to the last sign in it.
@@ -478,7 +640,11 @@ def _first_row(numbered: Lines, kinds: Sequence[str]) -> tuple[int, str | None, 
     like = [bool(usual) and d and f == usual[0][0] for f, d in zip(forms, data, strict=True)]
     for k in np.flatnonzero(like).tolist():
         after = like[k + 1 : k + 3]
-        if _above_names(numbered, forms, data, k):
+        # A line with empty fields is of a preamble if the names, all there, are soon below.
+        if not all(fields_of(numbered[k][1], forms[k][0])) and any(
+            forms[m] == forms[k] and not data[m] and all(fields_of(numbered[m][1], forms[m][0]))
+            for m in range(k + 1, min(k + 1 + PREAMBLE, len(forms)))
+        ):
             continue
         if k == 1:
             break
@@ -500,19 +666,6 @@ def _first_row(numbered: Lines, kinds: Sequence[str]) -> tuple[int, str | None, 
     separator = separator_of(numbered[0][1])
     names = fields_of(numbered[0][1], separator)
     return 1, separator, len(names) - (len(names) > 1 and not names[-1])
-
-
-def _above_names(
-    numbered: Lines, forms: list[tuple[str | None, int]], data: list[bool], k: int
-) -> bool:
-    """Whether a line with empty fields is of a preamble: the names, all there, are soon below."""
-    if all(fields_of(numbered[k][1], forms[k][0])):
-        return False
-    below = range(k + 1, min(k + 1 + PREAMBLE, len(forms)))
-    return any(
-        forms[m] == forms[k] and not data[m] and all(fields_of(numbered[m][1], forms[m][0]))
-        for m in below
-    )
 
 
 def are_data(fields: list[str]) -> bool:
@@ -743,9 +896,7 @@ def _whole_lines(
     for k, (row, line) in enumerate(numbered):
         last = k == len(numbered) - 1
         if last and k and _was_cut(line, numbered[max(0, k - 20) : k], top, ended):
-            findings.append(
-                Finding("io.last-line-cut-left-out", severity="note", file=name, row=row)
-            )
+            add_note(findings, "io.last-line-cut-left-out", file=name, row=row)
             break
         count = _count(line, separator)
         bare = line.rstrip(" \r\n")
@@ -779,15 +930,13 @@ def _whole_lines(
         if not rows:  # its separator is not that of the header
             count = _count(line, separator)
             raise DataError("io.csv-field-count", file=name, row=row, count=count, width=width)
-        findings.append(
-            Finding(
-                "io.comments-among-rows",
-                file=name,
-                row=row,
-                severity="note",
-                count=len(amid),
-                first=line.strip()[:60],
-            )
+        add_note(
+            findings,
+            "io.comments-among-rows",
+            file=name,
+            row=row,
+            count=len(amid),
+            first=line.strip()[:60],
         )
     return rows, lines
 
@@ -863,7 +1012,10 @@ def _was_cut(line: str, before: Lines, top: _Top, ended: bool) -> bool:
 
 def _parse(lines: list[str], count: int, separator: str | None, name: str) -> Columns:
     """Parse the lines under the header, each number to the nearest double."""
-    decimal = "," if _comma_is_decimal(lines, separator) else "."
+    line = next((line for line in lines if "," in line), "")
+    numbers = [f for f in fields_of(line, separator) if _NUMBER.fullmatch(f)]
+    comma = any("," in n for n in numbers) and not any("." in n for n in numbers)
+    decimal = "," if comma else "."
     if separator is None:
         lines = ["\t".join(line.split()) for line in lines]
     if separator and separator.strip() and any(f"{separator} " in line for line in lines[:JUDGED]):
@@ -883,12 +1035,6 @@ def _parse(lines: list[str], count: int, separator: str | None, name: str) -> Co
         raise DataError(
             "io.rows-cannot-taken-apart", file=name, splitlines=str(error).splitlines()[0]
         ) from None
-
-
-def _comma_is_decimal(lines: list[str], separator: str | None) -> bool:
-    line = next((line for line in lines if "," in line), "")
-    numbers = [f for f in fields_of(line, separator) if _NUMBER.fullmatch(f)]
-    return any("," in n for n in numbers) and not any("." in n for n in numbers)
 
 
 #: Rows that are written at a time.

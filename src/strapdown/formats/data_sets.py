@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import hdf5
 from strapdown.formats.arrays import raw_log
 from strapdown.formats.assemble import LOST
@@ -27,27 +27,17 @@ Array = NDArray[np.float64]
 # Trials of BROAD (Laidig, Caruso, Cereatti, Seel, Data 2021 6(7):72), with optical truth.
 
 
-def _has_trial(path: Path) -> bool:
-    """Whether HDF5 has the datasets of BROAD."""
-    return hdf5.outline(path)[0] >= {"imu_gyr", "imu_acc", "opt_quat"}
-
-
-detect_broad = Signs(suffixes=hdf5.SUFFIXES, also=_has_trial)
+detect_broad = Signs(
+    suffixes=hdf5.SUFFIXES,
+    also=lambda path: hdf5.outline(path)[0] >= {"imu_gyr", "imu_acc", "opt_quat"},
+)
 
 
 def read_broad(path: Path) -> RawLog:
     """Read a trial: sensor, optical attitude, and the samples that are scored.
 
-    Returns
-    -------
-    RawLog
-        Sensor axes are taken as forward, left, up. The truth is rotated alike, so that
-        error angles do not depend on this choice.
-
-    Raises
-    ------
-    DataError
-        The file is damaged, or a dataset differs in length from the gyro's.
+    Sensor axes are taken as forward, left, up. The truth is rotated alike, so that error angles do
+    not depend on this choice.
     """
     arrays, _, meta = hdf5.read_arrays(path)
     shapes = {n: arrays.get(n, np.empty(0)).shape for n in ("imu_gyr", "imu_acc", "opt_quat")}
@@ -96,22 +86,13 @@ TRIADS = {GYRO: ("gyro", "rad/s"), FORCE: ("accel", "m/s2"), MAG: ("mag", "uT")}
 CHEST = "pose/tango_ori"
 
 
-def _has_datasets(path: Path) -> bool:
-    """Whether HDF5 has the stamps and both sensors."""
-    return hdf5.outline(path)[0] >= {TIME, GYRO, FORCE}
-
-
-detect_ronin = Signs(suffixes=hdf5.SUFFIXES, also=_has_datasets)
+detect_ronin = Signs(
+    suffixes=hdf5.SUFFIXES, also=lambda path: hdf5.outline(path)[0] >= {TIME, GYRO, FORCE}
+)
 
 
 def read_ronin(path: Path) -> RawLog:
-    """Read rates, specific force and, if present, the magnetic field.
-
-    Raises
-    ------
-    DataError
-        The file is damaged, or an array has the wrong shape.
-    """
+    """Read rates, specific force and, if present, the magnetic field."""
     arrays, _, _ = hdf5.read_arrays(path, (TIME, *TRIADS))
     for name in (TIME, GYRO, FORCE):
         if name not in arrays:
@@ -134,14 +115,12 @@ def read_ronin(path: Path) -> RawLog:
         if name in arrays:
             stated |= {f"{name}[{k}]": (f"{triad}_{a}", unit) for k, a in enumerate("xyz")}
     if CHEST in hdf5.outline(path)[0]:
-        raw.findings.append(
-            Finding(
-                "io.attitude-of-other-phone",
-                file=path.name,
-                quantity="attitude",
-                severity="note",
-                name=CHEST,
-            )
+        add_note(
+            raw.findings,
+            "io.attitude-of-other-phone",
+            file=path.name,
+            quantity="attitude",
+            name=CHEST,
         )
     raw.stated, raw.axes = stated, AXES
     return raw
@@ -163,31 +142,14 @@ ACCEL_FILE = "mpu6050_accelerometer.mat"
 MPU_AXES = "-x,y,-z"
 
 
-def _has_gyro(folder: Path) -> bool:
-    return (folder / GYRO_FILE).is_file()
-
-
-detect_mpu = Signs(folder=_has_gyro)
+detect_mpu = Signs(folder=lambda path: (path / GYRO_FILE).is_file())
 
 
 def read_mpu(path: Path) -> RawLog:
     """Read the gyro, and the accelerometer if there is one.
 
-    Parameters
-    ----------
-    path : Path
-        The folder.
-
-    Returns
-    -------
-    RawLog
-        An accelerometer with its own stamps is interpolated to those of the gyro. The unused
-        tail of a buffer is dropped.
-
-    Raises
-    ------
-    DataError
-        A file is damaged or has another layout.
+    An accelerometer with its own stamps is interpolated to those of the gyro. The unused tail of a
+    buffer is dropped.
     """
     findings: list[Finding] = []
     gyro = _buffer(path / GYRO_FILE, "gyroBuffer", findings)
@@ -222,13 +184,8 @@ def _accel_columns(
         accel = np.column_stack(
             [time] + [np.interp(time, accel[order, 0], accel[order, k]) for k in (1, 2, 3)]
         )
-        findings.append(
-            Finding(
-                "io.interpolated-stamps-gyro-not-own-2",
-                file=ACCEL_FILE,
-                quantity="accel",
-                severity="note",
-            )
+        add_note(
+            findings, "io.interpolated-stamps-gyro-not-own-2", file=ACCEL_FILE, quantity="accel"
         )
     return {f"accel[{k}]": accel[:, k + 1] for k in range(3)}
 
@@ -247,15 +204,13 @@ def _buffer(path: Path, name: str, findings: list[Finding]) -> NDArray[Any]:
     used = np.flatnonzero((rows != 0).any(axis=1))
     end = int(used[-1]) + 1 if used.size else 0
     if end < len(rows):
-        findings.append(
-            Finding(
-                "io.last-rows-all-zero-tail",
-                file=path.name,
-                row=end + 1,
-                severity="note",
-                count=len(rows) - end,
-                count_2=len(rows),
-            )
+        add_note(
+            findings,
+            "io.last-rows-all-zero-tail",
+            file=path.name,
+            row=end + 1,
+            count=len(rows) - end,
+            count_2=len(rows),
         )
     return np.asarray(rows[:end], dtype=np.float64)
 
@@ -276,14 +231,8 @@ ALT, SPEED = "Height above ellipsoid (GT Height) [m]", "Velocity (GT Velocity) [
 detect_smartloc = Signs(text=r"\A" + "".join(f"(?=.*{re.escape(n)})" for n in (*FIRST, LAT, LON)))
 
 
-def read_smartloc(path: Path) -> RawLog:
-    """Read position and velocity of the reference, once an epoch.
-
-    Raises
-    ------
-    DataError
-        A column is missing, or a value is not a number.
-    """
+def read_smartloc_fixes(path: Path) -> RawLog:
+    """Read position and velocity of the reference, once an epoch."""
     raw = under(path)
     heading = next((n for n in raw.columns if n.startswith("Heading (0° = East, counterc")), "")
     held = {
@@ -298,9 +247,7 @@ def read_smartloc(path: Path) -> RawLog:
     log = stated_by(raw, held, clock=GPS)
     epochs = held["time"][0] + 604_800.0 * held["week"][0]
     log = selected(log, np.diff(epochs, prepend=-np.inf) != 0.0)
-    log.findings.append(
-        Finding("io.smartloc-reference", file=path.name, quantity="lat, lon, alt", severity="note")
-    )
+    add_note(log.findings, "io.smartloc-reference", file=path.name, quantity="lat, lon, alt")
     return log
 
 
@@ -316,11 +263,7 @@ LOG, POINTS = ("timestamps", "imu_data"), ("strideIndex", "GCP")
 COLUMNS = [*(f"accel_{a}" for a in "xyz"), *(f"gyro_{a}" for a in "xyz")]
 
 
-def _has_log(path: Path) -> bool:
-    return set(LOG) <= _names(path)
-
-
-detect_foot = Signs(suffixes=(".mat",), also=_has_log)
+detect_foot = Signs(suffixes=(".mat",), also=lambda path: set(LOG) <= _names(path))
 
 
 def detect_foot_points(path: Path) -> bool:
@@ -339,11 +282,7 @@ def _arrays(path: Path, *names: str) -> dict[str, Any]:
     for name in names:
         if name not in arrays:
             raise DataError(
-                "io.no-such-array",
-                file=path.name,
-                quantity=name,
-                name=name,
-                arrays=list(arrays),
+                "io.no-such-array", file=path.name, quantity=name, name=name, arrays=list(arrays)
             )
     return {name: arrays[name].astype(np.float64) for name in names}
 
@@ -363,13 +302,7 @@ def _log(path: Path) -> tuple[Array, Array]:
 
 
 def read_foot(path: Path) -> RawLog:
-    """Read rates and specific force.
-
-    Raises
-    ------
-    DataError
-        The file is damaged, or its arrays have the wrong shapes.
-    """
+    """Read rates and specific force."""
     time, imu = _log(path)
     units = {"gyro": "rad/s", "accel": "m/s2"}
     columns = {n: (imu[:, k], units[n.partition("_")[0]]) for k, n in enumerate(COLUMNS)}

@@ -20,7 +20,6 @@ from strapdown.formats.columns import (
     clocks_with_unit,
     read_name,
 )
-from strapdown.formats.nameless import rates_and_force
 from strapdown.formats.recording import INFERRED, STATED, Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import (
     BODY_RATES,
@@ -33,6 +32,7 @@ from strapdown.formats.vocabularies import (
 )
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, OF_TABLES, unit_of
 
+Array = NDArray[np.float64]
 AXES = "xyz"
 
 
@@ -51,12 +51,7 @@ _WHY: dict[Basis, str] = {
 class Column:
     """The column of a file that holds a quantity.
 
-    Attributes
-    ----------
-    source : str
-    unit : str or None
-    basis : {'name', 'file', 'option', 'numbers', 'open'}
-        What assigns it to the quantity.
+    `basis` ({'name', 'file', 'option', 'numbers', 'open'}): what assigns it to the quantity.
     """
 
     source: str
@@ -95,10 +90,7 @@ def find_columns(
         for q, name in _asked(raw, quantity, source):
             if name in wanted.values():
                 raise ConfigError(
-                    "io.column-named-twice",
-                    file=raw.name,
-                    quantity=f"--columns {q}",
-                    name=name,
+                    "io.column-named-twice", file=raw.name, quantity=f"--columns {q}", name=name
                 )
             wanted[q] = name
             inferred |= {q} if quantity in options.inferred else set()
@@ -133,17 +125,13 @@ def names_of_quantities(raw: RawLog) -> set[str]:
     return {str(read_name(name).quantity) for name in raw.columns}
 
 
-def require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
-    """Refuse a log without three rates; the message lists its columns."""
-    missing = [f"gyro_{a}" for a in AXES if f"gyro_{a}" not in found]
-    if not missing:
-        return
+def without_gyro(raw: RawLog, missing: list[str]) -> DataError:
+    """Make the error for a log without three rates; the message lists its columns."""
     if _is_nameless(raw):
-        raise DataError(_nameless(raw, {}))
+        return DataError(_nameless(raw, {}))
     left_out = [f for f in raw.findings if f.code.startswith("io.left-out")]
-    raise DataError(
+    return raw.fault(
         "io.no-gyro-columns-left-out" if left_out else "io.no-gyro-columns",
-        file=raw.name,
         missing=missing,
         columns=list(raw.columns) or ["none"],
         left_out=left_out,
@@ -298,6 +286,75 @@ def _by_motion(raw: RawLog) -> dict[str, str]:
     return out
 
 
+# Gyro and accelerometer among columns without names, by the motion of a body: the specific force of
+# one that turns, and is not shaken, turns against it: df/dt = -w x f. Of all triads of neighboring
+# columns, the gyro and the accelerometer of one unit fulfil it.
+
+
+#: Most columns and samples that are compared; samples of one change of the force: of seconds, in
+#: which a hand turns it more than it shakes it, at 10 to 200 Hz.
+COMPARED, MOST_SAMPLES, SPANS = 64, 6000, (25, 100, 200)
+#: Fewest changes that are compared.
+FEWEST_CHANGES = 8
+#: Least share of the changes that a gyro explains, and how far below the best the first may be.
+LEAST, NEAR = 0.8, 0.1
+#: Least turn of a force in all, rad.
+TURNED = 0.05
+
+
+def rates_and_force(columns: list[NDArray[np.generic]]) -> tuple[int, int] | None:
+    """Return the numbers, from 0, of the first columns of the gyro and of the accelerometer.
+
+    `columns` ((n,) each): a column that is no number is None of a triad. None where no pair of
+    triads explains the motion.
+    """
+    held = [_varied(c) for c in columns[:COMPARED]]
+    triads: dict[int, Array] = {}
+    for k in range(len(held) - 2):
+        columns_of = [c for c in held[k : k + 3] if c is not None]
+        if len(columns_of) == 3:
+            triads[k] = np.column_stack(columns_of)
+    forces = {}
+    for k, three in triads.items():
+        low, usual, high = np.quantile(np.linalg.norm(three, axis=1), (0.1, 0.5, 0.9))
+        if usual > 0.0 and (high - low) < LOOSEST * usual:
+            forces[k] = three
+    shares: dict[tuple[int, int], float] = {}
+    for at, force in forces.items():
+        for k, rate in triads.items():
+            if abs(k - at) >= 3:
+                turned = -np.cross(rate, force)
+                shares[k, at] = max(_explained(turned, force, span) for span in SPANS)
+    best = max(shares.values(), default=0.0)
+    if best < LEAST:
+        return None
+    return min(pair for pair, share in shares.items() if share > best - NEAR)
+
+
+def _explained(turned: Array, force: Array, span: int) -> float:
+    """Return the share of a force's changes that its turning explains, by one positive factor.
+
+    `turned` ((n, 3)): -w x f; the step of time, and the unit of the rates, are in the factor.
+    """
+    change = force[span::span] - force[:-span:span]
+    if len(change) < FEWEST_CHANGES:
+        return 0.0
+    turn = float(np.linalg.norm(change, axis=1).sum()) / float(np.abs(force).max())
+    if turn < TURNED:
+        return 0.0
+    model = turned[: len(change) * span].reshape(len(change), span, 3).sum(axis=1)
+    size, both = float((model * model).sum()), float((model * change).sum())
+    return both * both / (size * float((change * change).sum())) if size > 0.0 < both else 0.0
+
+
+def _varied(column: NDArray[np.generic]) -> Array | None:
+    """Return the first values of a column that is a number and not constant; None otherwise."""
+    if column.dtype.kind not in "iuf" or column.size < FEWEST_CHANGES * SPANS[0]:
+        return None
+    values = np.asarray(column[:MOST_SAMPLES], dtype=np.float64)
+    return values if bool(np.isfinite(values).all()) and np.ptp(values) > 0.0 else None
+
+
 def advances(values: NDArray[Any]) -> bool:
     """Whether a column advances evenly, as a clock does; a count of samples, by one, does not."""
     if values.size < 3:
@@ -334,7 +391,8 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
         if "rot" in one.family and letter & said.keys():
             said[name] = ColumnName(None)
     families = _families(raw, said)
-    _letter_g(raw, families, wanted, questions, found)
+    if ("gyro", "g") in families:
+        _letter_g(raw, families, wanted, questions, found)
     for triad in TRIADS:
         kept = _best({f: m for (t, f), m in families.items() if t == triad}, said)
         if not kept:
@@ -350,10 +408,24 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
         found |= {q: name for q, name in members.items() if q not in wanted}
         if wanted.keys() & members.keys():
             continue
-        if len(kept) > 1:
-            _ask_which(raw, triad, list(kept.values()), questions)
+        several = list(kept.values())
+        if len(several) > 1:
+            # The first is the answer as inferred.
+            axis = next(iter(sorted(several, key=len)[0]))
+            names = [m[axis] for m in several if axis in m]
+            which = _several(raw, f"{triad}_{axis}", names, names[0])
+            questions.ask(which, **_answer(raw, triad, first))
         elif said[next(iter(first.values()))].loose == UNKNOWN_WORDS:
-            _ask_whether(raw, triad, first, questions)
+            answer = _answer(raw, triad, first)
+            whether = Finding(
+                "io.columns-by-words",
+                file=raw.name,
+                quantity=triad,
+                of_what=triad,
+                names=[first[a] for a in AXES if a in first],
+                columns=[f"{quantity}={name}" for quantity, name in answer.items()],
+            )
+            questions.ask(whether, **answer)
     rest: dict[str, list[str]] = {}
     for name, one in said.items():
         if one.quantity in QUANTITIES and not one.family:
@@ -362,7 +434,9 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
         if quantity in wanted:
             continue
         if len(names) > 1 and quantity == "time":
-            names = [n for n in names if n != "T" and not _stands(raw.columns[n])]
+            # Nor is a stamp that every row has, as a date beside a clock that starts at zero.
+            held = {n: raw.columns[n] for n in names if n != "T"}
+            names = [n for n, v in held.items() if not (v.size > FEW and (v == v[0]).all())]
             names = _one_clock(raw, names) if names else []
         if not names:
             continue
@@ -436,9 +510,9 @@ def _letter_g(
     Beside other rates they are gravity or acceleration in g: asked, if no other acceleration is
     there.
     """
-    own = families.get(("gyro", "g"))
-    units = {_unit_of(raw, name) for name in own.values()} if own else set()
-    if not own or units <= set(GYRO_UNITS) or set(own.values()) & set(wanted.values()):
+    own = families["gyro", "g"]
+    units = {_unit_of(raw, name) for name in own.values()}
+    if units <= set(GYRO_UNITS) or set(own.values()) & set(wanted.values()):
         return
     linear = [n for (t, _), m in families.items() if t == "accel" for n in m.values()]
     whole = [n for n in linear if not read_name(n).linear]
@@ -472,30 +546,6 @@ def _several(raw: RawLog, quantity: str, names: list[str], first: str) -> Findin
         of_what=quantity,
         names_2=first,
     )
-
-
-def _ask_which(raw: RawLog, triad: str, kept: list[Family], questions: Questions) -> None:
-    """Ask which of several sensors to use; the first is the answer as inferred."""
-    axis = next(iter(sorted(kept, key=len)[0]))
-    names = [m[axis] for m in kept if axis in m]
-    answer = _answer(raw, triad, kept[0])
-    questions.ask(_several(raw, f"{triad}_{axis}", names, names[0]), **answer)
-
-
-def _ask_whether(raw: RawLog, triad: str, family: Family, questions: Questions) -> None:
-    """Ask whether columns whose names have words that are not known are those of a triad."""
-    names = [family[a] for a in AXES if a in family]
-    answer = _answer(raw, triad, family)
-    columns = [f"{quantity}={name}" for quantity, name in answer.items()]
-    finding = Finding(
-        "io.columns-by-words",
-        file=raw.name,
-        quantity=triad,
-        of_what=triad,
-        names=names,
-        columns=columns,
-    )
-    questions.ask(finding, **answer)
 
 
 def _answer(raw: RawLog, triad: str, family: Family) -> dict[str, str]:
@@ -538,11 +588,6 @@ def _one_clock(raw: RawLog, names: list[str]) -> list[str]:
     return names
 
 
-def _stands(values: NDArray[Any]) -> bool:
-    """Whether every row has the same stamp, as a date beside a clock that starts at zero."""
-    return values.size > FEW and bool((values == values[0]).all())
-
-
 #: Rows that a clock may stand still for: a burst of samples.
 FEW = 50
 
@@ -570,16 +615,12 @@ def _ros_unit(raw: RawLog, column: str) -> str | None:
     return ROS[field[2]][1]
 
 
-def _members(quantity: str) -> list[str]:
-    return [f"{quantity}_{a}" for a in AXES] if quantity in TRIADS else [quantity]
-
-
 def _asked(raw: RawLog, quantity: str, source: str) -> list[tuple[str, str]]:
     """Resolve one ``quantity=source`` of the user to existing columns."""
     names = list(raw.columns)
     if quantity in TRIADS:
         if members := _three_of(raw, quantity, source):
-            return list(zip(_members(quantity), members, strict=True))
+            return [(f"{quantity}_{a}", m) for a, m in zip(AXES, members, strict=True)]
     elif source in raw.columns:
         return [(quantity, source)]
     elif source.isdecimal() and 1 <= int(source) <= len(names):
@@ -642,21 +683,12 @@ def _is_axis(name: str, prefix: str, axis: str) -> bool:
 # Quantities of other tables, as fixes and trajectories, by a vocabulary of their own.
 
 
-Array = NDArray[np.float64]
-
-
 @dataclass(frozen=True)
 class Found:
     """The column of a quantity.
 
-    Attributes
-    ----------
-    source : str
-        Column name in the file.
-    factor : float
-        Factor to the table's unit and sign.
-    stated : bool
-        Whether the name states the unit; otherwise the table's own is assumed.
+    `source`: column name in the file. `factor`: factor to the table's unit and sign. `stated`:
+    whether the name states the unit; otherwise the table's own is assumed.
     """
 
     source: str

@@ -23,10 +23,10 @@ from strapdown.formats.gnss_fixes import (
     RADIUS,
     UNSTATED_VERTICAL,
     Fixes,
-    GnssOptions,
     table_of_fixes,
     utm_zone,
 )
+from strapdown.formats.gnss_fixes import GnssOptions as GnssOptions
 from strapdown.formats.gnss_pos import QUALITY
 from strapdown.formats.recording import RawLog
 from strapdown.formats.trajectory_readers import EARTH
@@ -34,14 +34,6 @@ from strapdown.formats.vocabularies import FIXES
 from strapdown.frames import geodetic_from_ecef, geodetic_from_ned, geodetic_from_utm
 from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD
 from strapdown.units import OF_TABLES, SPEEDS, TIME_UNITS, unit_of
-
-__all__ = [
-    "GnssOptions",
-    "fixes_of_columns",
-    "open_fixes",
-    "read_gnss",
-]
-
 
 # GNSS fixes from tables with column names: text, Parquet.
 
@@ -69,12 +61,8 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         there = [name for name in names if name in found]
         if there and len(there) < len(names):
             missing = next(name for name in names if name not in found)
-            raise DataError(
-                "io.missing-while-column",
-                file=raw.name,
-                quantity=missing,
-                there=there[0],
-                source=found[there[0]].source,
+            raise raw.fault(
+                "io.missing-while-column", missing, there=there[0], source=found[there[0]].source
             )
         return np.column_stack([values(name) for name in names]) if there else None
 
@@ -140,35 +128,28 @@ def _refuse_missing(raw: RawLog, found: dict[str, Found], *, stated: bool) -> No
     """
     missing = [q for q in ("time",) if q not in found]
     if not any(set(one) <= found.keys() for one in (_GEODETIC, _ECEF, _LOCAL)):
-        if not missing and (axes := _bare_axes(raw)):
-            x, y, z = axes
+        # Columns that are called x, y, z may be coordinates.
+        bare = {m[1].lower(): n for n in raw.columns if (m := _AXIS.fullmatch(n.strip()))}
+        if not missing and len(bare) == 3:
+            x, y, z = axes = [bare[axis] for axis in "xyz"]
             xyz = np.column_stack([numbers(raw, c, c) for c in axes])
             far = np.nanmedian(np.linalg.norm(np.asarray(xyz, dtype=np.float64), axis=1))
             if _NEAR_EARTH[0] < far < _NEAR_EARTH[1]:
                 columns = f"ecef_x={x},ecef_y={y},ecef_z={z}"
-                raise DataError(
+                raise raw.fault(
                     "io.positions-likely-ecef",
-                    file=raw.name,
-                    quantity=", ".join(axes),
+                    ", ".join(axes),
                     distance=far,
                     flags=f"--gnss-columns {shlex.quote(columns)}",
                     keys=f'columns = {{ecef_x = "{x}", ecef_y = "{y}", ecef_z = "{z}"}}',
                 )
-            raise DataError(
-                "io.positions-without-origin",
-                file=raw.name,
-                quantity=", ".join(axes),
-                x=x,
-                y=y,
-                z=z,
-            )
+            raise raw.fault("io.positions-without-origin", ", ".join(axes), x=x, y=y, z=z)
         missing += [q for q in _GEODETIC if q not in found]
     if set(_GEODETIC) <= found.keys() and not set(_HEIGHTS) & found.keys() and not stated:
         missing.append("alt")
     if missing:
-        raise DataError(
+        raise raw.fault(
             "io.fixes-without-height" if missing == ["alt"] else "io.missing-columns-2",
-            file=raw.name,
             missing=missing,
             columns=list(raw.columns),
             missing_2=missing[0],
@@ -178,12 +159,6 @@ def _refuse_missing(raw: RawLog, found: dict[str, Found], *, stated: bool) -> No
 #: Distances from the center of the Earth that a position on it, or near it, may have, m.
 _NEAR_EARTH = (6.3e6, 6.5e6)
 _AXIS = re.compile(r"(?:p|pos|position)?[\s_.]*([xyz])\b[\s_.]*(?:[\[(]?m[\])]?)?", re.I)
-
-
-def _bare_axes(raw: RawLog) -> list[str]:
-    """Return columns that are called x, y, z and may be coordinates; none unless all three."""
-    named = {m[1].lower(): name for name in raw.columns if (m := _AXIS.fullmatch(name.strip()))}
-    return [named[axis] for axis in "xyz"] if len(named) == 3 else []
 
 
 def _place(
@@ -207,10 +182,8 @@ def _place(
         return geodetic_from_ecef(np.column_stack([values(q) for q in _ECEF])), "alt"
     if options.origin is None:
         _refuse_zone_open(raw, found, values)
-        raise DataError(
-            "io.local-positions-origin-open",
-            file=raw.name,
-            quantity=", ".join(found[q].source for q in _LOCAL),
+        raise raw.fault(
+            "io.local-positions-origin-open", ", ".join(found[q].source for q in _LOCAL)
         )
     if isinstance(options.origin, str):
         zone, south = utm_zone(options.origin)
@@ -225,12 +198,8 @@ def _place(
 
 
 def _without_up(raw: RawLog) -> DataError:
-    return DataError(
-        "io.missing-columns-2",
-        file=raw.name,
-        missing=["up"],
-        columns=list(raw.columns),
-        missing_2="up",
+    return raw.fault(
+        "io.missing-columns-2", missing=["up"], columns=list(raw.columns), missing_2="up"
     )
 
 
@@ -243,27 +212,18 @@ def _refuse_zone_open(raw: RawLog, found: dict[str, Found], values: Callable[[st
     east, north = (float(np.nanmedian(values(q))) for q in ("east", "north"))
     if not (_EASTINGS[0] < east < _EASTINGS[1] and _NORTHINGS[0] < north < _NORTHINGS[1]):
         return
-    raise DataError(
-        "io.utm-zone-open",
-        file=raw.name,
-        quantity=", ".join(found[q].source for q in _LOCAL),
-        east=east,
-        north=north,
-    )
+    of = ", ".join(found[q].source for q in _LOCAL)
+    raise raw.fault("io.utm-zone-open", of, east=east, north=north)
 
 
 def _height(found: dict[str, Found], values: Callable[[str], Array], raw: RawLog) -> Array:
     if "alt_msl" not in found or "geoid" not in found:
         return values(next(q for q in _HEIGHTS if q in found))
-    raw.findings.append(
-        Finding(
-            "io.height-over-ellipsoid-over-sea",
-            file=raw.name,
-            quantity="alt",
-            severity="note",
-            source=found["alt_msl"].source,
-            source_2=found["geoid"].source,
-        )
+    raw.note(
+        "io.height-over-ellipsoid-over-sea",
+        quantity="alt",
+        source=found["alt_msl"].source,
+        source_2=found["geoid"].source,
     )
     return np.asarray(values("alt_msl") + values("geoid"))
 
@@ -314,15 +274,11 @@ def _over_ground(
     never = not known.any()
     speed = np.where(known, speed, np.nan)
     angle, none = np.radians(course), np.full(speed.size, np.nan)
-    raw.findings.append(
-        Finding(
-            "io.speed-and-course-never-known" if never else "io.velocity-by-speed-and-course",
-            severity="note",
-            file=raw.name,
-            quantity=", ".join(VELOCITY),
-            source=found["speed"].source,
-            source_2=found["course"].source,
-        )
+    raw.note(
+        "io.speed-and-course-never-known" if never else "io.velocity-by-speed-and-course",
+        quantity=", ".join(VELOCITY),
+        source=found["speed"].source,
+        source_2=found["course"].source,
     )
     if never:
         return None, None
@@ -337,14 +293,8 @@ def _over_ground(
 def _sd_of_speed(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]) -> Array:
     """Return the accuracy of the speed as the standard deviation of each part of the velocity."""
     stated = values("speed_sd")
-    raw.findings.append(
-        Finding(
-            "io.velocity-sd-by-speed",
-            severity="note",
-            file=raw.name,
-            quantity=", ".join(VELOCITY_SD),
-            source=found["speed_sd"].source,
-        )
+    raw.note(
+        "io.velocity-sd-by-speed", quantity=", ".join(VELOCITY_SD), source=found["speed_sd"].source
     )
     return np.column_stack([np.where(stated > 0.0, stated, np.nan)] * 3)
 
@@ -387,10 +337,9 @@ def _refuse_unit_of_speed(
     if unit is None or 2.0 * sd > _NEAR * ratio:
         return
     answer = dict.fromkeys(names, unit)
-    raise DataError(
+    raise raw.fault(
         "io.speed-unit-not-stated",
-        file=raw.name,
-        quantity=", ".join(names),
+        ", ".join(names),
         source=found[names[0]].source,
         ratio=1.0 / ratio,
         unit=unit,
@@ -415,15 +364,11 @@ def _accuracy(raw: RawLog, found: dict[str, Found], values: Callable[[str], Arra
         vertical = np.where(down > 0.0, down, np.nan)
     else:
         vertical = UNSTATED_VERTICAL * horizontal
-    raw.findings.append(
-        Finding(
-            "io.sd-by-accuracy",
-            severity="note",
-            file=raw.name,
-            quantity=", ".join(POSITION_SD),
-            source=found["horizontal_accuracy"].source,
-            unstated_vertical=None if "vertical_accuracy" in found else UNSTATED_VERTICAL,
-        )
+    raw.note(
+        "io.sd-by-accuracy",
+        quantity=", ".join(POSITION_SD),
+        source=found["horizontal_accuracy"].source,
+        unstated_vertical=None if "vertical_accuracy" in found else UNSTATED_VERTICAL,
     )
     return np.column_stack([horizontal, horizontal, vertical])
 
@@ -451,23 +396,18 @@ def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
         by_date = [u for u in ("ms", "us", "ns") if _DATES[0] < first * TIME_UNITS[u] < _DATES[1]]
         unit = (fits or by_date or ["ms"])[0]
         if len(fits) == 1 and _DATES[0] < first * TIME_UNITS[unit] < _DATES[1]:
-            raw.findings.append(
-                Finding(
-                    "io.time-unit-by-date",
-                    severity="note",
-                    file=raw.name,
-                    quantity="time",
-                    unit=unit,
-                    year=1970.0 + np.floor(first * TIME_UNITS[unit] / 31556952.0),
-                    step=step * TIME_UNITS[unit],
-                )
+            raw.note(
+                "io.time-unit-by-date",
+                quantity="time",
+                unit=unit,
+                year=1970.0 + np.floor(first * TIME_UNITS[unit] / 31556952.0),
+                step=step * TIME_UNITS[unit],
             )
             return time * TIME_UNITS[unit], Clock(name)
-        raise DataError(
+        raise raw.fault(
             "io.stamp-no-date-clock-tells",
-            file=raw.name,
-            row=raw.row(0),
-            quantity="time",
+            "time",
+            sample=0,
             first=first,
             source=found.source,
             flags=f"--gnss-units time={unit}",
@@ -485,18 +425,8 @@ def _quality(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array
     known = np.isin(codes, list(QUALITY))
     if not known.all():
         k = int(np.argmin(known))
-        raise DataError(
-            "io.solution-kind-unknown", file=raw.name, row=raw.row(k), quantity="Q", codes=codes[k]
-        )
-    raw.findings.append(
-        Finding(
-            "io.column-taken-codes-rtklib-fix",
-            severity="note",
-            file=raw.name,
-            quantity="quality",
-            source=found["Q"].source,
-        )
-    )
+        raise raw.fault("io.solution-kind-unknown", "Q", sample=k, codes=codes[k])
+    raw.note("io.column-taken-codes-rtklib-fix", quantity="quality", source=found["Q"].source)
     return np.array([QUALITY[int(q)] for q in codes], dtype=np.float64)
 
 
@@ -531,25 +461,12 @@ def read_gnss(
 ) -> pd.DataFrame:
     """Read the fixes of a GNSS receiver.
 
-    Parameters
-    ----------
-    options : GnssOptions, optional
-        User's statements about the file.
-    raw : RawLog or Fixes, optional
-        Its stream of fixes, if it was opened before (`open_fixes`), which is used up.
-
-    Returns
-    -------
-    DataFrame
-        A Gnss table with the time of the file; ``attrs`` has the clock (`clocks`), ``source``
-        and ``findings``. A missing velocity has an infinite standard deviation.
-
-    Raises
-    ------
-    ConfigError
-        The file or format does not exist, or `options` names a column that it does not have.
-    DataError
-        The file cannot be used; the message names file, row, quantity and remedy.
+    `options`: user's statements about the file. `raw`: its stream of fixes, if it was opened before
+    (`open_fixes`), which is used up. A Gnss table with the time of the file; ``attrs`` has the
+    clock (`clocks`), ``source`` and ``findings``. A missing velocity has an infinite standard
+    deviation. ConfigError: the file or format does not exist, or `options` names a column that it
+    does not have. DataError: the file cannot be used; the message names file, row, quantity and
+    remedy.
     """
     path, asked = Path(path), options or GnssOptions()
     if path.is_file() and comma2k19.belongs(path):

@@ -10,13 +10,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.arrays import told_by_file_rows
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
 from strapdown.tables import gnss_table
 from strapdown.tables.checks import GEODETIC, HEIGHTS_AS_STATED, POSITION_SD, VELOCITY, VELOCITY_SD
-
-__all__ = ["Fixes", "GnssOptions", "table_of_fixes"]
 
 Array = NDArray[np.float64]
 Sd = float | tuple[float, float, float]
@@ -47,57 +45,39 @@ def utm_zone(text: str) -> tuple[int, bool]:
 
 @dataclass(frozen=True)
 class GnssOptions:
-    """User's statements about a file of fixes; None means as in the file.
+    """User's statements about a file of fixes; None means as in the file."""
 
-    Attributes
-    ----------
-    format : str, optional
-        A key of `formats.READERS`.
-    columns : dict of str to str
-        Quantity (``time``, ``lat`` …, as in a Gnss table) to the name of its column, or its
-        number, from 1.
-    units : dict of str to str
-        Quantity to the unit of its column: ``time`` in ``ms``, ``lat`` in ``rad``.
-    datum_height : float, optional, m
-        Height over the ellipsoid of the level from which the file counts its heights: that of
-        the geoid, or of the point of take-off.
-    origin : tuple of float, or str, optional, deg, deg, m
-        Latitude, longitude and height of the origin of local positions (``north east up``); or the
-        zone of UTM, with its hemisphere, of northings and eastings: ``33N``.
-    position_sd, velocity_sd : float or tuple of float, optional, m and m/s
-        Standard deviations north, east, down, or one for all three, for each fix; they replace
-        those of the file.
-    unstated_position_sd, unstated_velocity_sd : float, optional, m and m/s
-        Used where the file states none; `attrs` of the table then has ``position_sd_taken``,
-        ``velocity_sd_taken``.
-    clock_steps : tuple of pairs of float, s
-        Steps of the receiver's clock, one after another: a stamp, and what is subtracted from it
-        and the later ones.
-    repair : bool
-        Drop and count rows that cannot be used, instead of refusing the file.
-    """
-
+    #: A key of `formats.READERS`.
     format: str | None = None
+    #: Quantity (``time``, ``lat`` …, as in a Gnss table) to the name of its column, or its number,
+    #: from 1.
     columns: Mapping[str, str] = field(default_factory=dict)
+    #: Quantity to the unit of its column: ``time`` in ``ms``, ``lat`` in ``rad``.
     units: Mapping[str, str] = field(default_factory=dict)
+    #: Height over the ellipsoid, m, of the level from which the file counts its heights: that of
+    #: the geoid, or of the point of take-off.
     datum_height: float | None = None
+    #: Latitude and longitude, deg, and height, m, of the origin of local positions (``north east
+    #: up``); or the zone of UTM, with its hemisphere, of northings and eastings: ``33N``.
     origin: tuple[float, float, float] | str | None = None
+    #: `position_sd`, `velocity_sd`: standard deviations north, east, down, or one for all three,
+    #: for each fix; they replace those of the file.
     position_sd: Sd | None = None
     velocity_sd: Sd | None = None
+    #: `unstated_position_sd`, `unstated_velocity_sd`: used where the file states none; `attrs` of
+    #: the table then has ``position_sd_taken``, ``velocity_sd_taken``.
     unstated_position_sd: float | None = None
     unstated_velocity_sd: float | None = None
+    #: Steps of the receiver's clock, s, one after another: a stamp, and what is subtracted from it
+    #: and the later ones.
     clock_steps: tuple[tuple[float, float], ...] = ()
+    #: Drop and count rows that cannot be used, instead of refusing the file.
     repair: bool = False
 
     def __post_init__(self) -> None:
         if isinstance(self.origin, str):
             utm_zone(self.origin)
-        for name in (
-            "position_sd",
-            "velocity_sd",
-            "unstated_position_sd",
-            "unstated_velocity_sd",
-        ):
+        for name in ("position_sd", "velocity_sd", "unstated_position_sd", "unstated_velocity_sd"):
             value = getattr(self, name)
             if value is not None and not (
                 np.shape(value) in ((), (3,)) and np.all(np.asarray(value) > 0.0)
@@ -107,45 +87,30 @@ class GnssOptions:
 
 @dataclass
 class Fixes:
-    """Fixes from a file, in the units of a Gnss table; NaN where missing.
-
-    Attributes
-    ----------
-    name : str
-    time : ndarray, (n,), s
-    place : ndarray, (n, 3)
-        Latitude and longitude in deg, height above the ellipsoid in m.
-    rows : ndarray of int, (n,)
-        Row of the file, counted from 1.
-    clock : Clock
-    velocity, position_sd, velocity_sd : ndarray, (n, 3), or None
-        North, east, down.
-    quality : ndarray, (n,), or None
-        As field 6 of NMEA 0183 GGA.
-    satellites : ndarray, (n,), or None
-        Used in each fix; for display.
-    zero_is_unknown : bool
-        A standard deviation of zero means unknown.
-    heights_from : {'sea', 'take-off', 'unstated', 'nowhere', ''}
-        Level from which heights are counted; empty: from the ellipsoid; 'nowhere': the fixes have
-        none.
-    height_source : str
-        Column or field of the heights, for messages.
-    findings : list of Finding
-    """
+    """Fixes from a file, in the units of a Gnss table; NaN where missing."""
 
     name: str
+    #: (n,), s.
     time: Array
+    #: (n, 3): latitude and longitude in deg, height above the ellipsoid in m.
     place: Array
+    #: (n,): row of the file, counted from 1.
     rows: NDArray[np.int64]
     clock: Clock = field(default_factory=lambda: Clock(RELATIVE))
+    #: `velocity`, `position_sd`, `velocity_sd`: (n, 3): north, east, down.
     velocity: Array | None = None
     position_sd: Array | None = None
     velocity_sd: Array | None = None
+    #: (n,): as field 6 of NMEA 0183 GGA.
     quality: Array | None = None
+    #: (n,): used in each fix; for display.
     satellites: Array | None = None
+    #: A standard deviation of zero means unknown.
     zero_is_unknown: bool = False
+    #: {'sea', 'take-off', 'unstated', 'nowhere', ''}: level from which heights are counted; empty:
+    #: from the ellipsoid; 'nowhere': the fixes have none.
     heights_from: str = ""
+    #: Column or field of the heights, for messages.
     height_source: str = ""
     findings: list[Finding] = field(default_factory=list)
 
@@ -163,13 +128,11 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     if fixes.position_sd is None and asked is None and options.unstated_position_sd is not None:
         asked = taken["position_sd_taken"] = options.unstated_position_sd
         if np.isinf(asked).all():
-            fixes.findings.append(
-                Finding(
-                    "io.position-sd-not-stated",
-                    severity="warning",
-                    file=fixes.name,
-                    quantity=", ".join(POSITION_SD),
-                )
+            add_warning(
+                fixes.findings,
+                "io.position-sd-not-stated",
+                file=fixes.name,
+                quantity=", ".join(POSITION_SD),
             )
     position_sd = _sd(fixes, "position", asked, count)
     if fixes.heights_from == NOWHERE:
@@ -235,19 +198,15 @@ def _over_ellipsoid(fixes: Fixes, options: GnssOptions) -> Array:
             **(proposed if fixes.heights_from != "take-off" else {}),
         )
     if fixes.heights_from != NOWHERE:
-        fixes.findings.append(_said_of_datum(fixes, options.datum_height))
+        add_note(
+            fixes.findings,
+            "io.heights-with-datum" if options.datum_height else "io.heights-stay-over-datum",
+            file=fixes.name,
+            quantity="alt",
+            source=fixes.height_source,
+            datum_height=options.datum_height,
+        )
     return np.asarray(fixes.place + np.array([0.0, 0.0, options.datum_height]))
-
-
-def _said_of_datum(fixes: Fixes, height: float) -> Finding:
-    return Finding(
-        "io.heights-with-datum" if height else "io.heights-stay-over-datum",
-        severity="note",
-        file=fixes.name,
-        quantity="alt",
-        source=fixes.height_source,
-        datum_height=height,
-    )
 
 
 def _sd_of_stated_height(fixes: Fixes, asked: Sd | None, options: GnssOptions, count: int) -> float:
@@ -258,15 +217,14 @@ def _sd_of_stated_height(fixes: Fixes, asked: Sd | None, options: GnssOptions, c
     """
     sd = STATED_HEIGHT_SD if asked is None or np.ndim(asked) == 0 else float(np.asarray(asked)[2])
     used = sd * float(np.sqrt(count))
-    fixes.findings.append(
-        Finding(
-            "io.fixes-with-stated-height",
-            file=fixes.name,
-            quantity="alt",
-            height=options.datum_height,
-            sd=sd,
-            used=used,
-        )
+    add_warning(
+        fixes.findings,
+        "io.fixes-with-stated-height",
+        file=fixes.name,
+        quantity="alt",
+        height=options.datum_height,
+        sd=sd,
+        used=used,
     )
     return used
 
@@ -295,14 +253,12 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
         time = np.asarray(whole)
         if weeks:
             row = int(fixes.rows[np.flatnonzero(keep)[weeks[0]]])
-            fixes.findings.append(
-                Finding(
-                    "io.seconds-of-week-unrolled",
-                    file=fixes.name,
-                    row=row,
-                    quantity="time",
-                    severity="note",
-                )
+            add_note(
+                fixes.findings,
+                "io.seconds-of-week-unrolled",
+                file=fixes.name,
+                row=row,
+                quantity="time",
             )
     for at, size in options.clock_steps:
         time = np.where(time >= at, time - size, time)
@@ -347,15 +303,7 @@ def _placed(fixes: Fixes, quality: Array, options: GnssOptions) -> NDArray[np.bo
 def _say_left_out(fixes: Fixes, keep: NDArray[np.bool_], code: str) -> None:
     out = np.flatnonzero(~keep)
     if out.size:
-        fixes.findings.append(
-            Finding(
-                code,
-                file=fixes.name,
-                row=int(fixes.rows[out[0]]),
-                severity="note",
-                count=out.size,
-            )
-        )
+        add_note(fixes.findings, code, file=fixes.name, row=int(fixes.rows[out[0]]), count=out.size)
 
 
 def _velocity(fixes: Fixes, asked: Sd | None, count: int) -> tuple[Array, Array]:
@@ -374,12 +322,11 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
         return np.broadcast_to(np.asarray(asked, dtype=np.float64), (count, 3)).copy()
     if stated is None:
         if what == "velocity":
-            fixes.findings.append(
-                Finding(
-                    "io.velocity-sd-not-stated",
-                    file=fixes.name,
-                    quantity=", ".join(VELOCITY),
-                )
+            add_warning(
+                fixes.findings,
+                "io.velocity-sd-not-stated",
+                file=fixes.name,
+                quantity=", ".join(VELOCITY),
             )
             return np.full((count, 3), np.inf)
         raise DataError("io.position-sd-not-stated", file=fixes.name, quantity=", ".join(names))
@@ -387,15 +334,14 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
     zero = sd == 0.0
     if fixes.zero_is_unknown and zero.any():
         rows = np.flatnonzero(zero.any(axis=1))
-        fixes.findings.append(
-            Finding(
-                "io.sd-of-zero-unknown",
-                file=fixes.name,
-                row=int(fixes.rows[rows[0]]),
-                quantity=names[int(np.argmax(zero[rows[0]]))],
-                count=rows.size,
-                of=what,
-            )
+        add_warning(
+            fixes.findings,
+            "io.sd-of-zero-unknown",
+            file=fixes.name,
+            row=int(fixes.rows[rows[0]]),
+            quantity=names[int(np.argmax(zero[rows[0]]))],
+            count=rows.size,
+            of=what,
         )
         sd = np.where(zero, np.inf, sd)
     bad = np.argwhere(~(sd > 0.0))

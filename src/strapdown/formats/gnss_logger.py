@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import UNIX, Clock, unix_from_gps
@@ -93,16 +93,8 @@ def _is_fix_header(line: str) -> bool:
 def read(path: Path) -> RawLog:
     """Read gyro, accelerometer and magnetometer, joined on the stamps of the gyro.
 
-    Returns
-    -------
-    RawLog
-        Stamps in ns since 1970: the evenly advancing time since the phone's start, plus the
-        median offset of its wall clock.
-
-    Raises
-    ------
-    DataError
-        A line is damaged, or the log has no gyro.
+    Stamps in ns since 1970: the evenly advancing time since the phone's start, plus the median
+    offset of its wall clock.
     """
     findings: list[Finding] = []
     lines = _lines(path)
@@ -113,9 +105,7 @@ def read(path: Path) -> RawLog:
         if kind is None:
             continue
         if kind == "UncalGyro":
-            findings.append(
-                Finding("io.uncalibrated-gyro", file=path.name, quantity=triad, severity="note")
-            )
+            add_note(findings, "io.uncalibrated-gyro", file=path.name, quantity=triad)
         table, rows = _table(path, lines[kind], SENSOR)
         table["time"] = _whole(table["elapsedRealtimeNanos"], path, rows) + ahead
         log = sensor_log(
@@ -142,8 +132,7 @@ def read(path: Path) -> RawLog:
 def read_fixes(path: Path) -> Fixes:
     """Read the fixes of the receiver.
 
-    Returns stamps in s since 1970, on the clock of the sensors if the log has
-    it. DataError: the log has no fix, or a line is damaged.
+    Returns stamps in s since 1970, on the clock of the sensors if the log has it.
     """
     findings: list[Finding] = []
     lines = _lines(path)
@@ -173,21 +162,17 @@ def read_fixes(path: Path) -> Fixes:
     if at["elapsed"] and any(lines.get(k) for k in ("UncalGyro", "Gyro")):
         elapsed = _whole(table[str(at["elapsed"])], path, rows)[keep]
         time = np.asarray((elapsed + _ahead(path, lines, findings)) * 1e-9, dtype=np.float64)
-        findings.append(
-            Finding("io.fixes-since-start", file=path.name, quantity="time", severity="note")
-        )
+        add_note(findings, "io.fixes-since-start", file=path.name, quantity="time")
     horizontal = values("radius") / RADIUS
     vertical = values("vertical")
     if np.isnan(vertical).any() and np.isfinite(horizontal).any():
         vertical = np.where(np.isnan(vertical), UNSTATED_VERTICAL * horizontal, vertical)
-        findings.append(
-            Finding(
-                "io.how-well-heights-known-not",
-                file=path.name,
-                quantity="down_sd",
-                severity="note",
-                unstated_vertical=UNSTATED_VERTICAL,
-            )
+        add_note(
+            findings,
+            "io.how-well-heights-known-not",
+            file=path.name,
+            quantity="down_sd",
+            unstated_vertical=UNSTATED_VERTICAL,
         )
     # Velocity needs both speed and bearing; the vertical velocity is never known.
     speed, speed_sd = values("speed"), values("speed_sd")
@@ -272,14 +257,12 @@ def _ahead(path: Path, lines: dict[str, list[tuple[int, str]]], findings: list[F
     ahead = utc * 1_000_000 - _whole(table["elapsedRealtimeNanos"], path, rows)
     middle = int(np.sort(ahead)[ahead.size // 2])
     if (drift := float(np.ptp(ahead)) * 1e-9) > MOST_DRIFT:
-        findings.append(
-            Finding(
-                "io.phone-clock-day-moves-against",
-                file=path.name,
-                quantity="time",
-                severity="note",
-                drift=drift,
-            )
+        add_note(
+            findings,
+            "io.phone-clock-day-moves-against",
+            file=path.name,
+            quantity="time",
+            drift=drift,
         )
     return middle
 
@@ -303,24 +286,19 @@ def _of_one_provider(
     chosen = next((p for p in PROVIDERS if (said == p).any()), None)
     if chosen is None:
         raise DataError(
-            "io.no-gnss-fix",
-            file=path.name,
-            quantity="Provider",
-            said=sorted(set(said)),
+            "io.no-gnss-fix", file=path.name, quantity="Provider", said=sorted(set(said))
         )
     keep: NDArray[np.bool_] = np.asarray(said == chosen)
     if not keep.all():
-        findings.append(
-            Finding(
-                "io.fixes-of-one-provider",
-                file=path.name,
-                quantity="Provider",
-                severity="note",
-                used=int(keep.sum()),
-                count=keep.size,
-                provider=chosen,
-                others=sorted(set(said[~keep])),
-            )
+        add_note(
+            findings,
+            "io.fixes-of-one-provider",
+            file=path.name,
+            quantity="Provider",
+            used=int(keep.sum()),
+            count=keep.size,
+            provider=chosen,
+            others=sorted(set(said[~keep])),
         )
     return keep
 
@@ -340,7 +318,7 @@ detect_pseudoranges = Signs(
 )
 
 
-def read_challenge(path: Path) -> RawLog:
+def read_challenge_fixes(path: Path) -> RawLog:
     """Read the positions of the reference receiver."""
     raw = under(path)
     held = {"time": (unix_from_gps(column(raw, "millisSinceGpsEpoch") * 1e-3), "s")}

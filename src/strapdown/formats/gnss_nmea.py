@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.gnss_fixes import Fixes
@@ -34,8 +34,6 @@ from strapdown.formats.writing import (
 )
 from strapdown.tables.checks import POSITION_SD, values_of
 from strapdown.units import SPEEDS
-
-__all__ = ["detect", "read", "write"]
 
 _SENTENCE = re.compile(r"\$([A-Z]{2})([A-Z]{3}),([^*]*)\*([0-9A-Fa-f]{2})\s*$")
 _DAY = 86400.0
@@ -75,16 +73,8 @@ def rows_beside(path: Path) -> int:
 def read(path: Path) -> Fixes:
     """Read the fixes of NMEA sentences.
 
-    Returns
-    -------
-    Fixes
-        In seconds since 1970 if a date is stated, otherwise in seconds of the first day.
-        Sentences with a wrong checksum are dropped and counted.
-
-    Raises
-    ------
-    DataError
-        The file has no GGA, a field is not a number, or some GGA lack the geoid undulation.
+    In seconds since 1970 if a date is stated, otherwise in seconds of the first day. Sentences with
+    a wrong checksum are dropped and counted.
     """
     text, findings = csv.decoded(path.read_bytes(), path.name)
     epochs: list[_Epoch] = []
@@ -102,15 +92,7 @@ def read(path: Path) -> Fixes:
     if not fixed:
         raise DataError("io.holds-no-gga-sentence-whole", file=path.name)
     if wrong:
-        findings.append(
-            Finding(
-                "io.nmea-lines-left-out",
-                file=path.name,
-                row=wrong[0],
-                severity="note",
-                count=len(wrong),
-            )
-        )
+        add_note(findings, "io.nmea-lines-left-out", file=path.name, row=wrong[0], count=len(wrong))
     time, clock = _times(fixed)
     sd = np.array([e.sd for e in fixed])
     placed = [e for e in fixed if np.isfinite(e.place[2])]

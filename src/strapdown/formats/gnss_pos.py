@@ -17,15 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK, Clock, leap_seconds
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.signs import Signs
 from strapdown.formats.text_columns import columns_at_once
 from strapdown.frames import geodetic_from_ecef, q_ne
-
-__all__ = ["QUALITY", "detect", "read"]
 
 Array = NDArray[np.float64]
 #: Receivers of Emlid write it with the second ending, and without a line of names.
@@ -67,17 +65,9 @@ class _Layout:
 def read(path: Path) -> Fixes:
     """Read the fixes of an RTKLIB solution.
 
-    Returns
-    -------
-    Fixes
-        Time in seconds of the GPS week of the first row: UTC is converted with its leap
-        seconds, JST with nine more hours.
-
-    Raises
-    ------
-    DataError
-        No line names the columns, and the rows are not as RTKLIB writes them; the solution is a
-        baseline, the datum is another, or a row is damaged.
+    Time in seconds of the GPS week of the first row: UTC is converted with its leap seconds, JST
+    with nine more hours. DataError: no line names the columns, and the rows are not as RTKLIB
+    writes them; the solution is a baseline, the datum is another, or a row is damaged.
     """
     text, findings = _decoded(path)
     lines = text.splitlines()
@@ -183,7 +173,7 @@ def _without_header(lines: list[str], file: str, findings: list[Finding]) -> _La
             names[3:3] = ["Q", "ns"]
             if len(rest) > _PLAIN:
                 names += _VELOCITY if level else _ECEF_VELOCITY
-            findings.append(Finding("io.pos-without-header", file=file, row=row))
+            add_warning(findings, "io.pos-without-header", file=file, row=row)
             return _Layout("GPST", names, separator, row)
     places = [f for f in fields[:2] if _FLOAT.fullmatch(f) and "." in f and abs(float(f)) <= 180.0]
     code = "io.list-of-stations" if len(places) == 2 else "io.no-line-names-columns-gpst"
@@ -219,9 +209,7 @@ def _columns(
     plain = [(row, line.translate(table)) for row, line in held]
     widths = [len(line.split()) for _, line in plain]
     if widths[-1] < len(names) and (not ended or len(plain) > 1):
-        findings.append(
-            Finding("io.last-line-cut-left-out", severity="note", file=file, row=plain[-1][0])
-        )
+        add_note(findings, "io.last-line-cut-left-out", file=file, row=plain[-1][0])
         plain, widths = plain[:-1], widths[:-1]
     if not plain:
         raise DataError("io.only-line-under-header-cut", file=file, row=held[0][0])

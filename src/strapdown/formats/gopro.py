@@ -80,19 +80,12 @@ def _has_telemetry(path: Path) -> bool:
 
 # Text in UTF-16 too.
 detect = Signs(
-    first=rb"\A(?:DEVC|.{4}ftyp|(?:\xef\xbb\xbf)?\s*\{|\xff\xfe|\xfe\xff)",
-    also=_has_telemetry,
+    first=rb"\A(?:DEVC|.{4}ftyp|(?:\xef\xbb\xbf)?\s*\{|\xff\xfe|\xfe\xff)", also=_has_telemetry
 )
 
 
 def read(path: Path) -> RawLog:
-    """Read the gyro, with the accelerometer interpolated to its stamps.
-
-    Raises
-    ------
-    DataError
-        The file is damaged, or does not state its stamps or the order of its axes.
-    """
+    """Read the gyro, with the accelerometer interpolated to its stamps."""
     streams, clock = _streams(path)
     if "GYRO" not in streams:
         if "ACCL" in streams and len(_held(streams)) == 0:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Collection
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.formats.arrays import raw_log
 from strapdown.formats.recording import RawLog
-from strapdown.formats.signs import Signs, first_bytes, state_of
+from strapdown.formats.signs import Signs, first_bytes, while_unchanged
 from strapdown.parsers import parse
 
 SUFFIXES = (".h5", ".hdf5", ".hdf", ".mat")
@@ -31,15 +30,7 @@ detect = Signs(suffixes=SUFFIXES, also=_is_hdf5)
 def read(path: Path) -> RawLog:
     """Read the numeric datasets of an HDF5 file.
 
-    Returns
-    -------
-    RawLog
-        Datasets in groups are named ``group/dataset``.
-
-    Raises
-    ------
-    DataError
-        The file is not HDF5, is damaged, or declares more data than it holds.
+    Datasets in groups are named ``group/dataset``.
     """
     arrays, units, meta = read_arrays(path)
     return raw_log(path, arrays, units, meta)
@@ -56,16 +47,12 @@ def read_arrays(
     return found["arrays"], found["units"], found["meta"]
 
 
+@while_unchanged(4)
 def outline(path: Path) -> tuple[frozenset[str], frozenset[str]]:
     """Return the names of all objects and of the attributes of a file; none if it is not HDF5.
 
     DataError: it refers to another file.
     """
-    return _outline(path, state_of(path))
-
-
-@lru_cache(maxsize=4)
-def _outline(path: Path, _state: tuple[Any, ...]) -> tuple[frozenset[str], frozenset[str]]:
     if SIGNATURE not in first_bytes(path, 1 << 20):
         return frozenset(), frozenset()
     found = parse("hdf5.outline", path)
@@ -100,18 +87,11 @@ def write(
 _HEADER = b"MATLAB 5.0 MAT-file, written by strapdown"
 
 
-def _is_old(path: Path) -> bool:
-    return not _is_hdf5(path)
-
-
-detect_matlab = Signs(suffixes=(".mat",), also=_is_old)
+detect_matlab = Signs(suffixes=(".mat",), also=lambda path: not _is_hdf5(path))
 
 
 def read_matlab(path: Path) -> RawLog:
-    """Read the numeric arrays of a MATLAB file.
-
-    DataError: the file is not a MATLAB file, is damaged, or declares more data than it holds.
-    """
+    """Read the numeric arrays of a MATLAB file."""
     arrays, meta = read_matlab_arrays(path)
     return raw_log(path, arrays, {}, meta)
 
@@ -122,13 +102,11 @@ def read_matlab_arrays(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, A
     return found["arrays"], found["meta"]
 
 
+@while_unchanged(4)
 def contents_of_matlab(path: Path) -> tuple[tuple[str, str], ...]:
     """Return name and class of each variable; none if damaged, or HDF5."""
-    return _contents(path, state_of(path)) if _is_old(path) else ()
-
-
-@lru_cache(maxsize=4)
-def _contents(path: Path, _state: tuple[Any, ...]) -> tuple[tuple[str, str], ...]:
+    if _is_hdf5(path):
+        return ()
     return tuple((name, kind) for name, kind in parse("matlab.contents", path))
 
 

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import GPS, UNIX, WEEK, usual_step
 from strapdown.formats.columns import read_name
 from strapdown.formats.hdf5 import SIGNATURE, outline, read_arrays
-from strapdown.formats.known_formats import column, lacking, selected, split, stated_by, under
+from strapdown.formats.known_formats import column, lacking, selected, stated_by, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, first_bytes, head
 from strapdown.units import TIME_UNITS, unit_of
@@ -66,9 +66,9 @@ def _csv(path: Path) -> RawLog:
     top = next((k for k, line in enumerate(lines) if line.startswith("Time,")), None)
     if top is None or len(lines) < top + 3:
         raise DataError("io.csv-without-rows", file=path.name, row=len(lines))
-    names, units = (split(lines[top + k], ",") for k in (0, 1))
+    names, units = (csv.fields_of(lines[top + k], ",") for k in (0, 1))
     # Rows may end in a comma, which the names do not.
-    more = split(lines[top + 2], ",")[len(names) :]
+    more = csv.fields_of(lines[top + 2], ",")[len(names) :]
     header = ",".join([*names, *(f"unnamed {k}" for k in range(len(more)))])
     raw = under(path, top, header=header, drop=1)
     said = dict(zip(names, units, strict=False))
@@ -96,15 +96,7 @@ def _of_monitors(
     """State the columns of each monitor; `gyro`: behind the name of one, its rates."""
     raw.stated, *raw.other_units = stated
     if len(names) > 1:
-        raw.findings.append(
-            Finding(
-                "io.first-of-monitors",
-                file=raw.name,
-                quantity="gyro",
-                monitors=names,
-                other=f"{names[1]}{gyro}",
-            )
-        )
+        raw.warn("io.first-of-monitors", quantity="gyro", monitors=names, other=f"{names[1]}{gyro}")
     return raw
 
 
@@ -244,7 +236,7 @@ def _time(raw: RawLog) -> tuple[dict[str, tuple[NDArray[Any], str | None]], str]
         return {"time": (np.asarray(tow + WEEK * (week - week[0])), "s")}, GPS
     if "Time" in raw.columns:
         return {"time": (raw.columns["Time"], None)}, UNIX
-    raise DataError("io.microstrain-without-stamps", file=raw.name, quantity="time")
+    raise raw.fault("io.microstrain-without-stamps", "time")
 
 
 # x-IMU3 of x-io Technologies: CSV of its software, a folder of tables or one of them.
@@ -279,13 +271,7 @@ def files_of_xio(path: Path) -> tuple[Path, ...]:
 
 
 def read_xio(path: Path) -> RawLog:
-    """Read rates and specific force, without rows that repeat the one before.
-
-    Raises
-    ------
-    DataError
-        The table is damaged.
-    """
+    """Read rates and specific force, without rows that repeat the one before."""
     raw = under(path / TABLE if path.is_dir() else path)
     time = next(t for t in TIMES if t in raw.columns)
     held = {q: column(raw, n) for q, (n, _) in NAMES.items()}
@@ -347,16 +333,7 @@ detect_xsens = Signs(text=f"{COUNTER}|{STAMP}", also=_has_names_of_xsens)
 def read_xsens(path: Path) -> RawLog:
     """Read rates and specific force, with stamps from the counters.
 
-    Returns
-    -------
-    RawLog
-        Stamps in µs of ``SampleTimeFine``; without it, of ``PacketCounter`` and the stated
-        rate.
-
-    Raises
-    ------
-    DataError
-        The file is damaged, or the tick of the clock is not known.
+    Stamps in µs of ``SampleTimeFine``; without it, of ``PacketCounter`` and the stated rate.
     """
     data = path.read_bytes()
     raw = csv.parse(data, path.name, (path,))
@@ -375,9 +352,7 @@ def read_xsens(path: Path) -> RawLog:
     }
     findings = list(raw.findings)
     if "Mag_X" in raw.columns:
-        findings.append(
-            Finding("io.xsens-mag-not-used", file=path.name, quantity="mag", severity="note")
-        )
+        add_note(findings, "io.xsens-mag-not-used", file=path.name, quantity="mag")
     columns = dict(raw.columns)
     source, stamps = _stamps(raw, rate, findings)
     if source is not None:
@@ -402,29 +377,25 @@ def _stamps(
         ticks = _unwrapped(raw, STAMP, (32,), findings)
         tick = 1 if _is_of_dot(raw) else _tick(raw, ticks, rate or _rate_by_other_clock(raw))
         if tick != 1:
-            findings.append(
-                Finding(
-                    "io.xsens-tick",
-                    file=raw.name,
-                    quantity="time",
-                    severity="note",
-                    column=STAMP,
-                    tick_us=tick,
-                )
+            add_note(
+                findings,
+                "io.xsens-tick",
+                file=raw.name,
+                quantity="time",
+                column=STAMP,
+                tick_us=tick,
             )
         return STAMP, ticks * tick
     if rate is None or COUNTER not in raw.columns:
         return None, np.empty(0)
     count = _unwrapped(raw, COUNTER, (16, 32), findings)
-    findings.append(
-        Finding(
-            "io.stamps-over-hz-top-file",
-            file=raw.name,
-            quantity="time",
-            severity="note",
-            counter=COUNTER,
-            rate=rate,
-        )
+    add_note(
+        findings,
+        "io.stamps-over-hz-top-file",
+        file=raw.name,
+        quantity="time",
+        counter=COUNTER,
+        rate=rate,
     )
     return COUNTER, np.asarray((count - count[0]) * (1e6 / rate))
 
@@ -467,17 +438,15 @@ def _unwrapped(
             falls = np.flatnonzero(steps < -(2 ** (bits - 1)))
             if falls.size:
                 count[1:] += np.cumsum(steps < -(2 ** (bits - 1))) * 2**bits
-                findings.append(
-                    Finding(
-                        "io.wrapped-bits-all-undone",
-                        file=raw.name,
-                        row=raw.row(int(falls[0]) + 1),
-                        quantity="time",
-                        severity="note",
-                        name=name,
-                        bits=bits,
-                        size=falls.size,
-                    )
+                add_note(
+                    findings,
+                    "io.wrapped-bits-all-undone",
+                    file=raw.name,
+                    row=raw.row(int(falls[0]) + 1),
+                    quantity="time",
+                    name=name,
+                    bits=bits,
+                    size=falls.size,
                 )
             break
     return count
@@ -495,10 +464,9 @@ def _tick(raw: RawLog, ticks: NDArray[Any], rate: float | None) -> int:
         fits = [t for t, r in found.items() if RATES[0] <= r <= RATES[1]]
     if len(fits) == 1:
         return fits[0]
-    raise DataError(
+    raise raw.fault(
         "io.xsens-tick-undecided" if rate is None else "io.xsens-tick-against-rate",
-        file=raw.name,
-        quantity=STAMP,
+        STAMP,
         step=step,
         rate_hz=rate,
         choices=[

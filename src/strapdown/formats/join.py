@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.find_columns import Column, find_columns
 from strapdown.formats.inference.conclusion import infer_time_unit
@@ -19,8 +19,6 @@ from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.formats.vocabularies import QUANTITIES
 from strapdown.tables import find_gaps
 from strapdown.units import TIME_UNITS
-
-__all__ = ["at_stamps", "clock_of", "in_seconds", "join", "known_only", "with_columns"]
 
 Array = NDArray[np.float64]
 AXES = "xyz"
@@ -90,15 +88,13 @@ def join(
                 columns[source] = values[:, j]
                 stated[source] = (f"{triad}_{a}", column.unit)
     if lost := int((~keep).sum()):
-        findings.append(
-            Finding(
-                "io.rows-left-out-another-sensor",
-                file=gyro.name,
-                row=gyro.row(int(np.argmin(keep))),
-                severity="note",
-                lost=lost,
-                size=keep.size,
-            )
+        add_note(
+            findings,
+            "io.rows-left-out-another-sensor",
+            file=gyro.name,
+            row=gyro.row(int(np.argmin(keep))),
+            lost=lost,
+            size=keep.size,
         )
     everything = tuple(dict.fromkeys(f for log in logs for f in log.files))
     rows = np.arange(1, keep.size + 1) if gyro.rows is None else gyro.rows
@@ -129,12 +125,7 @@ def clock_of(log: RawLog, found: dict[str, Column]) -> OwnClock:
     DataError: the log has no stamps, or they are not numbers.
     """
     if "time" not in found:
-        raise DataError(
-            "io.join-time-column-missing",
-            file=log.name,
-            quantity="time",
-            columns=list(log.columns),
-        )
+        raise log.fault("io.join-time-column-missing", "time", columns=list(log.columns))
     ticks, dated = ticks_of(log, found["time"].source, found["time"].unit)
     return OwnClock(ticks, "ns" if dated else found["time"].unit)
 
@@ -212,56 +203,48 @@ def _onto(
     if stamps.size == time.size and np.array_equal(stamps, time):
         return values, np.ones(time.size, dtype=bool)
     if not stamps.size or not known.any():
-        findings.append(
-            Finding("io.left-out-without-number", file=log.name, quantity=triad, severity="note")
-        )
+        add_note(findings, "io.left-out-without-number", file=log.name, quantity=triad)
         return None, known
     out, inside, distance = at_stamps(time, stamps, values)
     if not inside.any():
         start = np.nanmin(time)
-        raise DataError(
+        raise log.fault(
             "io.stamps-run-after-first-gyro",
-            file=log.name,
-            quantity="time",
+            "time",
             stamps=(stamps[0] - start) * factor,
             stamps_2=(stamps[-1] - start) * factor,
             nanmax=(np.nanmax(time) - start) * factor,
         )
     covered = int(inside.sum())
     if covered < COVERED * known.sum():
-        findings.append(
-            Finding(
-                "io.left-out-few-samples",
-                file=log.name,
-                quantity=triad,
-                severity="note",
-                covered=covered,
-                count=int(known.sum()),
-            )
+        add_note(
+            findings,
+            "io.left-out-few-samples",
+            file=log.name,
+            quantity=triad,
+            covered=covered,
+            count=int(known.sum()),
         )
         return None, known
     if distance > 0:
-        findings.append(
-            Finding(
-                "io.interpolated-stamps-gyro-not-own",
-                file=log.name,
-                quantity=triad,
-                severity="note",
-                covered=covered,
-                distance=distance * factor,
-            )
+        add_note(
+            findings,
+            "io.interpolated-stamps-gyro-not-own",
+            file=log.name,
+            quantity=triad,
+            covered=covered,
+            distance=distance * factor,
         )
     if gaps := find_gaps(stamps):
         longest = max(gaps, key=lambda g: g.length)
-        findings.append(
-            Finding(
-                "io.gaps-in-force" if triad == "accel" else "io.gaps-in-sensor",
-                severity="warning" if triad == "accel" else "note",
-                file=log.name,
-                quantity=triad,
-                count=len(gaps),
-                length=longest.length * factor,
-            )
+        add_warning(
+            findings,
+            "io.gaps-in-force" if triad == "accel" else "io.gaps-in-sensor",
+            severity="warning" if triad == "accel" else "note",
+            file=log.name,
+            quantity=triad,
+            count=len(gaps),
+            length=longest.length * factor,
         )
     # A gyro stamp that is not a number is refused or repaired together with the gyro.
     return np.where(known[:, None], out, 0.0), inside | ~known
@@ -275,15 +258,13 @@ def _in_order(
     order = np.flatnonzero(use)[np.argsort(stamps[use], kind="stable")]
     order = order[np.diff(stamps[order], prepend=-np.inf) > 0]
     if lost := stamps.size - order.size:
-        findings.append(
-            Finding(
-                "io.samples-not-used-no-number",
-                file=name,
-                quantity=triad,
-                severity="note",
-                lost=lost,
-                size=stamps.size,
-            )
+        add_note(
+            findings,
+            "io.samples-not-used-no-number",
+            file=name,
+            quantity=triad,
+            lost=lost,
+            size=stamps.size,
         )
     return stamps[order], values[order]
 

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers, told_by_file_rows
 from strapdown.formats.clocks import GPS, WEEK, Clock, clock_of, unrolled, with_clock
@@ -36,26 +36,6 @@ from strapdown.formats.writing import (
 )
 from strapdown.tables import ACCEL, GYRO, TRAJECTORY, check_trajectory, trajectory_table
 from strapdown.tables.checks import MAG, POSITION_SD, VELOCITY_SD, index_of, values_of
-
-__all__ = [
-    "COLUMNS",
-    "FOLDER_TITLE",
-    "detect",
-    "detect_fixes",
-    "detect_folder",
-    "detect_trajectory",
-    "files_of_folder",
-    "read",
-    "read_fixes",
-    "read_folder",
-    "read_folder_fixes",
-    "read_folder_trajectory",
-    "read_trajectory",
-    "write",
-    "write_dated_nav",
-    "write_nav",
-]
-
 
 Array = NDArray[np.float64]
 COLUMNS = ["time", *(f"dtheta_{a}" for a in "xyz"), *(f"dv_{a}" for a in "xyz")]
@@ -111,27 +91,13 @@ detect = Signs(suffixes=SUFFIXES, first=rb"\A[^,\0]*\Z", also=_begins_with_incre
 def read(path: Path) -> RawLog:
     """Read increments of angle and velocity.
 
-    Returns
-    -------
-    RawLog
-        Columns `COLUMNS`, in s, rad, m/s. Axes forward, right, down if gravity is on the third
-        axis, downward; otherwise not stated.
-
-    Raises
-    ------
-    DataError
-        The file is not text, a row has another width, or the numbers are not increments.
+    Columns `COLUMNS`, in s, rad, m/s. Axes forward, right, down if gravity is on the third axis,
+    downward; otherwise not stated.
     """
     raw = csv.read(path)
     names = list(raw.columns)
     if len(names) != len(COLUMNS) or any(n.startswith("column ") is False for n in names):
-        raise DataError(
-            "io.kf-gins-column-count",
-            file=raw.name,
-            row=raw.row(0),
-            count=len(names),
-            names=names[:8],
-        )
+        raise raw.fault("io.kf-gins-column-count", sample=0, count=len(names), names=names[:8])
     columns = dict(zip(COLUMNS, raw.columns.values(), strict=True))
     axes = raw.axes
     if all(c.dtype.kind in "iuf" for c in columns.values()):
@@ -156,14 +122,11 @@ def _axes(columns: dict[str, NDArray[np.float64]], raw: RawLog) -> str | None:
         return None
     down = float(np.median(columns["dv_z"])) / step
     told = down < -0.5 * _GRAVITY[0]
-    raw.findings.append(
-        Finding(
-            "io.taken-for-kf-gins" if told else "io.taken-for-kf-gins-axes-open",
-            file=raw.name,
-            severity="note" if told else "warning",
-            rate_hz=1.0 / step,
-            down=down,
-        )
+    raw.warn(
+        "io.taken-for-kf-gins" if told else "io.taken-for-kf-gins-axes-open",
+        severity="note" if told else "warning",
+        rate_hz=1.0 / step,
+        down=down,
     )
     return "x,y,z" if told else None
 
@@ -198,19 +161,11 @@ detect_fixes = Signs(
 
 
 def read_fixes(path: Path) -> Fixes:
-    """Read fixes without a header.
-
-    DataError: the number of columns differs, or a value is not a number.
-    """
+    """Read fixes without a header."""
     raw = csv.read(path)
     names = WITH_VELOCITY if len(raw.columns) == len(WITH_VELOCITY) else NAMES
     if len(raw.columns) != len(names):
-        raise DataError(
-            "io.kf-gins-fix-column-count",
-            file=raw.name,
-            row=raw.row(0),
-            count=len(raw.columns),
-        )
+        raise raw.fault("io.kf-gins-fix-column-count", sample=0, count=len(raw.columns))
     return fixes_of(raw, names)
 
 
@@ -224,15 +179,11 @@ def fixes_of(raw: RawLog, names: tuple[str, ...]) -> Fixes:
     def block(first: int) -> np.ndarray:
         return np.column_stack([values[n] for n in names[first : first + 3]])
 
-    raw.findings.append(
-        Finding(
-            "io.taken-for-kf-gins-fixes-with-velocity"
-            if len(names) > len(NAMES)
-            else "io.taken-for-kf-gins-fixes",
-            file=raw.name,
-            severity="note",
-            count=len(names),
-        )
+    raw.note(
+        "io.taken-for-kf-gins-fixes-with-velocity"
+        if len(names) > len(NAMES)
+        else "io.taken-for-kf-gins-fixes",
+        count=len(names),
     )
     return Fixes(
         name=raw.name,
@@ -307,12 +258,8 @@ def read_trajectory(path: Path) -> pd.DataFrame:
     """
     raw = csv.read(path)
     if len(raw.columns) != len(TRAJECTORY_NAMES):
-        raise DataError(
-            "io.nav-column-count",
-            file=raw.name,
-            row=raw.row(0),
-            count=len(raw.columns),
-            count_2=len(TRAJECTORY_NAMES),
+        raise raw.fault(
+            "io.nav-column-count", sample=0, count=len(raw.columns), count_2=len(TRAJECTORY_NAMES)
         )
     named = zip(TRAJECTORY_NAMES, raw.columns, strict=True)
     values = {n: np.asarray(numbers(raw, c, n), dtype=np.float64) for n, c in named}
@@ -370,12 +317,8 @@ def _member(folder: Path, is_one: Callable[[Path], bool]) -> Path | None:
     return found[0] if len(found) == 1 else None
 
 
-def _has_increments(folder: Path) -> bool:
-    """Whether there is one text of increments; there may be fixes and a trajectory."""
-    return _member(folder, detect) is not None
-
-
-detect_folder = Signs(folder=_has_increments)
+# One text of increments; there may be fixes and a trajectory.
+detect_folder = Signs(folder=lambda path: _member(path, detect) is not None)
 
 
 def _of_folder(path: Path, stream: str, is_one: Callable[[Path], bool]) -> Path:
@@ -400,7 +343,7 @@ def read_folder_fixes(path: Path) -> Fixes:
     return read_fixes(_of_folder(path, "gnss", _are_fixes))
 
 
-def read_folder_trajectory(path: Path) -> pd.DataFrame:
+def read_folder_reference(path: Path) -> pd.DataFrame:
     """Read the trajectory of a folder."""
     return read_trajectory(_of_folder(path, "reference", detect_trajectory))
 
@@ -453,7 +396,7 @@ def _seconds_of_week(
     stamps, week, findings = gps_ns(table, options, "KF-GINS")
     if week is not None:
         source = table.attrs.get("source")
-        findings.append(Finding("io.written-without-week", file=source, severity="note", week=week))
+        add_note(findings, "io.written-without-week", file=source, week=week)
     return stamps % int(WEEK * SECOND), findings
 
 
@@ -468,7 +411,7 @@ def _write_increments(path: Path, imu: pd.DataFrame, options: FileOptions) -> li
         sums = 0.5 * (values[1:] + values[:-1]) * np.diff(time)[:, None]
         stamps = stamps[1:]
         source = imu.attrs.get("source")
-        findings.append(Finding("io.written-increments-of-line", file=source, severity="note"))
+        add_note(findings, "io.written-increments-of-line", file=source)
     if MAG[0] in imu.columns:
         findings.append(not_held("KF-GINS", "imu", "the magnetic field", imu))
     findings += mark_not_held("KF-GINS", imu)
@@ -485,7 +428,7 @@ def _write_fixes(path: Path, gnss: pd.DataFrame, options: FileOptions) -> list[F
         raise DataError("io.written-needs-position-sd", file=source, form="KF-GINS")
     if not keep.all():
         data = {"count": int((~keep).sum()), "rows": keep.size}
-        findings.append(Finding("io.written-fixes-without-sd", file=source, data=data))
+        add_warning(findings, "io.written-fixes-without-sd", file=source, data=data)
     velocity_sd = values_of(gnss, VELOCITY_SD)[keep]
     names = list(WITH_VELOCITY[1:])
     if not (np.isfinite(velocity_sd) & (velocity_sd > 0.0)).all():

@@ -79,15 +79,8 @@ detect = Signs(folder=_has_samples)
 def read(path: Path) -> RawLog:
     """Read rates and specific force, with the attitude of the unit's own solution as truth.
 
-    Parameters
-    ----------
-    path : Path
-        The folder ``oxts``, or its parent, the folder of the drive.
-
-    Raises
-    ------
-    DataError
-        A file is missing or damaged.
+    `path`: the folder ``oxts``, or its parent, the folder of the drive. DataError: a file is
+    missing or damaged.
     """
     time, values, files = _values(path)
     if np.isnan(values[:, RATE]).all():
@@ -143,7 +136,7 @@ def read_fixes(path: Path) -> Fixes:
     )
 
 
-def read_trajectory(path: Path) -> pd.DataFrame:
+def read_reference(path: Path) -> pd.DataFrame:
     """Read the unit's own solution as a trajectory.
 
     Parameters
@@ -273,21 +266,19 @@ def _are_rotations(values: Array) -> NDArray[np.bool_]:
     return np.asarray((off < _ORTHOGONAL) & (np.linalg.det(turn) > 0.0))
 
 
-detect_poses = Signs(
-    suffixes=csv.SUFFIXES,
-    text=r"^[ \t]*(?:[^\s,#]+[ \t]+){11}[^\s,#]+[ \t\r]*$",
-    also=_has_poses,
+detect_odometry = Signs(
+    suffixes=csv.SUFFIXES, text=r"^[ \t]*(?:[^\s,#]+[ \t]+){11}[^\s,#]+[ \t\r]*$", also=_has_poses
 )
 
 
-def files_of_poses(path: Path) -> tuple[Path, ...]:
+def files_of_odometry(path: Path) -> tuple[Path, ...]:
     """List the poses, and the stamps beside them or in the folder of their sequence."""
     sequence = path.absolute().parent.parent / "sequences" / path.stem
     beside = (path.parent / "times.txt", sequence / "times.txt")
     return (path, *[p for p in beside if p.is_file() and p != path][:1])
 
 
-def read_poses(path: Path) -> pd.DataFrame:
+def read_odometry_reference(path: Path) -> pd.DataFrame:
     """Read a trajectory whose comments state where its first pose is.
 
     DataError: they do not, a stamp is missing, or a row is not a pose.
@@ -302,7 +293,7 @@ def read_poses(path: Path) -> pd.DataFrame:
         bad = int(np.argmin(good))
         raise DataError("io.pose-without-rotation", file=path.name, row=raw.row(bad))
     time: Array = np.zeros(0)
-    for stamps in files_of_poses(path)[1:]:
+    for stamps in files_of_odometry(path)[1:]:
         time = np.asarray(next(iter(csv.read(stamps).columns.values())), dtype=np.float64)
     if time.size != len(values):
         raise DataError(
@@ -346,7 +337,11 @@ def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
         accel_needed(imu, "KITTI")
         own, said = dates(imu, options, "KITTI")
         inside = _within(own, stamps)
-        findings += [*said, *imu_not_held("KITTI", imu), *_left_out(imu, inside)]
+        findings += [*said, *imu_not_held("KITTI", imu)]
+        if not inside.all():
+            lost = {"count": int((~inside).sum()), "rows": inside.size}
+            source = imu.attrs.get("source")
+            findings.append(Finding("io.written-samples-left-out", file=source, data=lost))
         if not inside.any():
             raise DataError("io.written-no-overlap", file=imu.attrs.get("source"), form="KITTI")
         from strapdown.evaluation.trajectory_differences import trajectory_at
@@ -381,13 +376,6 @@ def _within(own: NDArray[np.int64], stamps: NDArray[np.int64]) -> NDArray[np.boo
     after = np.clip(after, 1, stamps.size - 1)
     inside &= stamps[after] - stamps[after - 1] <= LONGEST_STEP * SECOND
     return np.asarray(inside | np.isin(own, stamps))
-
-
-def _left_out(imu: pd.DataFrame, inside: NDArray[np.bool_]) -> list[Finding]:
-    if inside.all():
-        return []
-    data = {"count": int((~inside).sum()), "rows": inside.size}
-    return [Finding("io.written-samples-left-out", file=imu.attrs.get("source"), data=data)]
 
 
 def _interpolated(imu: pd.DataFrame, same: NDArray[np.bool_]) -> list[Finding]:

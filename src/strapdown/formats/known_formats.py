@@ -19,6 +19,7 @@ from strapdown.errors import DataError, Finding, StrapdownError
 from strapdown.formats import csv, gnss_nmea
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import Clock, with_clock
+from strapdown.formats.columns import read_name
 from strapdown.formats.find_columns import Column
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.join import OwnClock, at_stamps, in_seconds
@@ -52,9 +53,7 @@ def column(raw: RawLog, name: str) -> NDArray[Any]:
     DataError: it is missing, or a value is not a number.
     """
     if name not in raw.columns:
-        raise DataError(
-            "io.no-column-4", file=raw.name, missing=[name], columns=", ".join(raw.columns)
-        )
+        raise raw.fault("io.no-column-4", missing=[name], columns=", ".join(raw.columns))
     return numbers(raw, name, name)
 
 
@@ -100,16 +99,7 @@ def from_json(path: Path) -> Any:
 def names_of(path: Path) -> list[str]:
     """Return the names in the first line, for format detection."""
     lines = head(path).splitlines()
-    return split(lines[0]) if lines else []
-
-
-def split(line: str, separator: str | None = "") -> list[str]:
-    """Split a line into fields, by its own separator; quotes that do not close are text."""
-    by = csv.separator_of(line) if separator == "" else separator
-    try:
-        return csv.fields_of(line, by)
-    except Exception:  # of the standard library: a quote that does not close, a long field
-        return [field.strip() for field in line.split(by)]
+    return csv.fields_of(lines[0], csv.separator_of(lines[0])) if lines else []
 
 
 def lacking(path: Path, stream: str, title: str, streams: Iterable[str]) -> DataError:
@@ -118,6 +108,82 @@ def lacking(path: Path, stream: str, title: str, streams: Iterable[str]) -> Data
     if there:
         return NoStreamError(name, stream, title, there)
     return DataError("io.no-known-stream", file=name, title=title)
+
+
+# Tables whose rows are of several sensors of one kind, one after another. Flight controllers write
+# the rows of two or three inertial sensors under one header (``I`` 0, 1, 0, 1 …), programs those of
+# several units (``DeviceName``). Read as one log they are a body that jumps.
+
+
+#: Names of the column that tells sensors apart, without signs and blanks, in lower case.
+_OF_SENSORS = {
+    *("i", "id", "instance", "imu", "imuid", "sensor", "sensorid", "sensorindex", "sensornumber"),
+    *("device", "deviceid", "devicename", "unit", "unitid", "node", "nodeid", "board", "address"),
+}
+#: Most sensors of a table, fewest rows of each, and the share of the rows after which another
+#: follows: a number that changes less often is a state.
+MOST_SENSORS, FEWEST, CHANGES = 16, 10, 0.1
+#: Largest scatter of the lengths of runs, as a share of that without order.
+REGULAR = 0.5
+
+
+def _all_have_rates(raw: RawLog, sensors: NDArray[np.str_]) -> bool:
+    """Whether most rows of each sensor have a rate: kinds of sensors fill columns of their own."""
+    rate = next(c for n, c in raw.columns.items() if read_name(n).quantity == "gyro_x")
+    if rate.dtype.kind not in "iuf":
+        return False
+    known = np.isfinite(rate)
+    return all(known[sensors == one].mean() > 0.5 for one in np.unique(sensors))
+
+
+def _in_turns(sensors: NDArray[np.str_]) -> bool:
+    """Whether the values follow each other as the numbers of sensors that are read in turns do.
+
+    Runs of equal values then have one length, in blocks, too; those of a number without order have
+    a geometric distribution, by the share of that value.
+    """
+    begins = np.flatnonzero(np.r_[True, sensors[1:] != sensors[:-1]])
+    lengths = np.diff(np.r_[begins, sensors.size])
+    for one in np.unique(sensors):
+        runs = lengths[sensors[begins] == one]
+        if runs.std() > REGULAR * runs.mean() * np.sqrt(np.mean(sensors == one)):
+            return False
+    return True
+
+
+def of_one_sensor(raw: RawLog) -> RawLog:
+    """Keep the rows of the first of several sensors, with a warning; the same log if it has one."""
+    if all(read_name(name).quantity != "gyro_x" for name in raw.columns):
+        return raw
+    for name, values in raw.columns.items():
+        if (
+            re.sub(r"[^a-z0-9]", "", name.lower()) not in _OF_SENSORS
+            or values.dtype.kind not in "iuO"
+        ):
+            continue
+        texts = values.astype(str)
+        sensors, counts = np.unique(texts, return_counts=True)
+        changes = np.count_nonzero(texts[1:] != texts[:-1])
+        if not 1 < sensors.size <= MOST_SENSORS or counts.min() < FEWEST:
+            continue
+        if changes < CHANGES * texts.size or not _in_turns(texts):
+            continue
+        if not _all_have_rates(raw, texts):
+            continue
+        first = str(texts[0])
+        finding = Finding(
+            "io.rows-of-several-sensors",
+            severity="warning",
+            file=raw.name,
+            name=name,
+            count=int(sensors.size),
+            sensors=[f"{s} ({n} rows)" for s, n in zip(sensors, counts, strict=True)],
+            first=first,
+        )
+        raw = selected(raw, texts == first)
+        raw.findings.append(finding)
+        return raw
+    return raw
 
 
 # Sensors of phones, each with the sign of its phone.

@@ -30,7 +30,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, add_note
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.gnss_fixes import RADIUS, UNSTATED_VERTICAL, Fixes
 from strapdown.formats.known_formats import lacking
@@ -47,26 +47,6 @@ from strapdown.formats.sensor_streams import (
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.tables import GEODETIC, GNSS, VELOCITY
 from strapdown.tables.checks import POSITION_SD, VELOCITY_SD
-
-__all__ = [
-    "EVENT",
-    "FRAME",
-    "JOURNAL",
-    "MAGIC",
-    "MEASURED",
-    "ROWS",
-    "RUN",
-    "SAMPLE",
-    "SCHEMA",
-    "WORD",
-    "event_payload",
-    "event_streams",
-    "events_in",
-    "fixes_of",
-    "records",
-    "run_of",
-    "session_folder",
-]
 
 Array = NDArray[np.float64]
 
@@ -176,10 +156,7 @@ def event_streams(run: dict[str, Any]) -> SensorStreams:
 
 
 def read(path: Path) -> RawLog:
-    """Read gyro, specific force and magnetic field as the session used them.
-
-    DataError: the journal is damaged, or has no samples.
-    """
+    """Read gyro, specific force and magnetic field as the session used them."""
     run, rows, streams = _received(path)
     joined = [one for one in rows if isinstance(one, Joined)]
     name = path.resolve().name
@@ -197,15 +174,15 @@ def read(path: Path) -> RawLog:
         blocks["mag"] = (np.array([one.mag or none for one in joined]), "uT")
     for triad, (values, unit) in blocks.items():
         columns |= {f"{triad}_{axis}": (values[:, k], unit) for k, axis in enumerate("xyz")}
-    log = RawLog.of(path, columns, axes=run.get("axes"), sampling=_sampling(run))
+    live = (run.get("configuration") or {}).get("live") or {}
+    sampling = str(live.get("sampling") or "instantaneous")
+    log = RawLog.of(path, columns, axes=run.get("axes"), sampling=sampling)
     log.name, log.files = name, files_of(path)
     log.clock, log.epoch = (UNIX, float(streams.epoch)) if streams.epoch else (RELATIVE, 0.0)
     log.sparse = frozenset({"mag"})
     if streams.unused:
         said = [f"{count} {reason}" for reason, count in sorted(streams.unused.items())]
-        log.findings.append(
-            Finding("io.session-events-not-used", file=name, severity="note", said=said)
-        )
+        add_note(log.findings, "io.session-events-not-used", file=name, said=said)
     return log
 
 
@@ -276,12 +253,6 @@ def fixes_of(located: Sequence[Located], name: str, clock: Clock) -> Fixes:
         position_sd=np.column_stack([horizontal, horizontal, vertical]),
         velocity_sd=np.column_stack([sd, sd, nothing]),
     )
-
-
-def _sampling(run: dict[str, Any]) -> str:
-    """Return the sampling that a run of navigation was configured with."""
-    live = (run.get("configuration") or {}).get("live") or {}
-    return str(live.get("sampling") or "instantaneous")
 
 
 def _received(path: Path) -> tuple[dict[str, Any], list[Joined | Located], SensorStreams]:

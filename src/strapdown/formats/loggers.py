@@ -61,13 +61,7 @@ detect_vbo = Signs(
 
 
 def read_vbo_fixes(path: Path) -> RawLog:
-    """Read the fixes; rows without satellites are left out.
-
-    Raises
-    ------
-    DataError
-        A column of time or position is missing, or a section is empty.
-    """
+    """Read the fixes; rows without satellites are left out."""
     lines = [line.strip() for line in _lines(path)]
     names = next((lines[k + 1] for k, n in enumerate(lines[:-1]) if n == "[column names]"), "")
     begin = lines.index("[data]") + 1
@@ -184,13 +178,7 @@ detect_gyroflow = Signs(text=r"\A(?:GYROFLOW IMU LOG|CAMERA IMU LOG)")
 
 
 def read_gyroflow(path: Path) -> RawLog:
-    """Read the samples in counts, with the values of a count.
-
-    Raises
-    ------
-    DataError
-        The names of the columns are missing.
-    """
+    """Read the samples in counts, with the values of a count."""
     lines = _lines(path)
     begin = next((k for k, line in enumerate(lines) if re.match(r"t,gx,gy,gz\b", line)), None)
     if begin is None:

@@ -29,19 +29,6 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, printable
 
-__all__ = [
-    "LARGEST_TILE",
-    "NORTHERNMOST",
-    "ChosenTiles",
-    "MapBox",
-    "MapFile",
-    "Tile",
-    "TileFolder",
-    "chosen_tiles",
-    "open_map",
-    "write_tiles",
-]
-
 #: Largest tile, bytes; least and largest side, pixels.
 LARGEST_TILE, SIDES = 1 << 20, (64, 1024)
 #: Characters of a name or an attribution that are shown.
@@ -62,13 +49,7 @@ LIST = "tiles.json"
 class Tile:
     """A picture of a map.
 
-    Attributes
-    ----------
-    zoom, column, row : int
-        Row from the north.
-    media : {'png', 'jpeg', 'webp'}
-    side : int
-        Pixels.
+    `zoom`, `column`, `row`: row from the north. `media` ({'png', 'jpeg', 'webp'}). `side`: pixels.
     """
 
     zoom: int
@@ -93,13 +74,8 @@ class _Archive(Protocol):
 class MapFile:
     """An open map.
 
-    Attributes
-    ----------
-    path : Path
-    name, attribution : str
-        Plain text in one line, as the file states it; empty if it states none.
-    zooms : (int, int)
-        Least and largest zoom, as the file states them.
+    `name`, `attribution`: plain text in one line, as the file states it; empty if it states none.
+    `zooms` ((int, int)): least and largest zoom, as the file states them.
     """
 
     path: Path
@@ -111,15 +87,8 @@ class MapFile:
     def tile(self, zoom: int, column: int, row: int) -> Tile | None:
         """Return a tile; None if there is none.
 
-        Parameters
-        ----------
-        zoom, column, row : int
-            Row from the north.
-
-        Raises
-        ------
-        DataError
-            The file is damaged, or the tile is not a PNG, JPEG or WebP within the limits.
+        `zoom`, `column`, `row`: row from the north. DataError: the file is damaged, or the tile is
+        not a PNG, JPEG or WebP within the limits.
         """
         with _damage(self.path):
             data = self.archive.tile(zoom, column, row)
@@ -149,15 +118,8 @@ class MapFile:
 def open_map(path: str | Path) -> Iterator[MapFile]:
     """Open a map by its content.
 
-    Parameters
-    ----------
-    path : str or Path
-        MBTiles, PMTiles, or a folder that `write_tiles` wrote.
-
-    Raises
-    ------
-    DataError
-        The file is missing, damaged, of another kind, or has vector tiles.
+    `path`: MBTiles, PMTiles, or a folder that `write_tiles` wrote. DataError: the file is missing,
+    damaged, of another kind, or has vector tiles.
     """
     path = Path(path)
     with ExitStack() as kept:
@@ -442,10 +404,7 @@ def _varints(data: bytes) -> Numbers:
 def tile_number(zoom: int, column: int, row: int) -> int:
     """Number of a tile: after all of lower zooms, along the Hilbert curve of its own.
 
-    Parameters
-    ----------
-    zoom, column, row : int
-        Row from the north.
+    `zoom`, `column`, `row`: row from the north.
     """
     number = ((1 << 2 * zoom) - 1) // 3
     x, y, half = column, row, (1 << zoom) >> 1
@@ -482,10 +441,7 @@ _LARGEST_ZOOM = 24  # tiles of two meters
 class ChosenTiles:
     """Tiles of one zoom, each with its column counted on across the date line.
 
-    Attributes
-    ----------
-    count : int
-        How many tiles cover the plan.
+    `count`: how many tiles cover the plan.
     """
 
     zoom: int
@@ -497,12 +453,8 @@ class ChosenTiles:
 class MapBox:
     """A part of Web Mercator: ends from west to east and from north to south, as shares of it.
 
-    Attributes
-    ----------
-    west, east : float
-        Of the whole Earth; may be below 0 or beyond 1 at the date line.
-    lat : float, deg
-        Of the corner nearest to a pole, without a sign.
+    `west`, `east`: of the whole Earth; may be below 0 or beyond 1 at the date line. `lat` (deg): of
+    the corner nearest to a pole, without a sign.
     """
 
     west: float
@@ -583,12 +535,7 @@ class TileFolder:
 def write_tiles(folder: Path, of: MapFile, tiles: list[Tile]) -> tuple[Path, ...]:
     """Write tiles of a map as a folder that `open_map` opens; return its files.
 
-    Parameters
-    ----------
-    folder : Path
-        Does not exist.
-    of : MapFile
-        For name and attribution.
+    `folder`: does not exist. `of`: for name and attribution.
     """
     folder.mkdir()
     files = [folder / LIST]

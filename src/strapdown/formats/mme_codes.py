@@ -16,9 +16,6 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["DIMENSIONS", "DUMMIES", "FILTERS", "LENGTH", "NO_CLASS", "MmeCode", "decode_mme"]
-
-
 LENGTH = 16
 #: Letter of a channel without a filter class.
 NO_CLASS = "X"
@@ -45,52 +42,37 @@ _LOCATIONS = ("BODY_PARTS", "VEHICLE_PARTS", "CRITERIA", "OTHER_PLACES")
 
 @dataclass(frozen=True)
 class MmeCode:
-    """A decoded channel code.
+    """A decoded channel code."""
 
-    Attributes
-    ----------
-    code : str
-        As given, in capitals.
-    test_object, position, location, dimension, direction, filter : str
-        In words; a code that is not in the tables is quoted.
-    fine : tuple of str
-        Fine locations in words, without unused ones.
-    quantity : str
-        A key of `crash_record.QUANTITIES`.
-    axis : str
-        ``x y z`` for the directions X, Y, Z; else empty.
-    vehicle : str
-        Test object with its own motion, by its code: ``1``, ``M``; else empty.
-    body : str
-        Body of that object that the sensor is fixed to: ``vehicle`` for its structure, or another
-        in words: ``front left occupant's head``, ``engine``.
-    point : str
-        Position and locations as coded, of a redundant sensor those of the primary one.
-    deforms : str
-        Key of `crash_record.DEFORMS` for a part that some crash pushes in; else empty.
-    redundant : bool
-    listed : bool
-        Whether the main location is in the tables.
-    unknown : tuple of str
-        Fields not in the tables, as ``main location 'QQQQ'``.
-    """
-
+    #: As given, in capitals.
     code: str
+    #: `test_object`, `position`, `location`, `dimension`, `direction`, `filter`: in words; a code
+    #: that is not in the tables is quoted.
     test_object: str
     position: str
     location: str
+    #: Fine locations in words, without unused ones.
     fine: tuple[str, ...]
     dimension: str
     direction: str
     filter: str
+    #: A key of `crash_record.QUANTITIES`.
     quantity: str
+    #: ``x y z`` for the directions X, Y, Z; else empty.
     axis: str
+    #: Test object with its own motion, by its code: ``1``, ``M``; else empty.
     vehicle: str
+    #: Body of that object that the sensor is fixed to: ``vehicle`` for its structure, or another in
+    #: words: ``front left occupant's head``, ``engine``.
     body: str
+    #: Position and locations as coded, of a redundant sensor those of the primary one.
     point: str
+    #: Key of `crash_record.DEFORMS` for a part that some crash pushes in; else empty.
     deforms: str
     redundant: bool
+    #: Whether the main location is in the tables.
     listed: bool
+    #: Fields not in the tables, as ``main location 'QQQQ'``.
     unknown: tuple[str, ...]
 
     @property

@@ -7,11 +7,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
 from strapdown.formats.crash_record import (
     CHANGE_NOTE,
@@ -29,23 +30,6 @@ from strapdown.formats.mme_codes import DIMENSIONS, DUMMIES, NO_CLASS, MmeCode, 
 from strapdown.tables import SAMPLINGS
 from strapdown.units import FACTORS, OF_CRASHES, TIME_UNITS, find_unit
 
-__all__ = [
-    "MmeFile",
-    "MmeHeader",
-    "channel_of",
-    "clock_of",
-    "even_stamps",
-    "is_bad",
-    "read",
-    "read_header",
-    "read_mme_file",
-    "read_number",
-    "read_samples",
-    "stamps_of",
-    "text_of",
-]
-
-
 MOST_FILES = 20_000
 _NUMBERED = re.compile(r"\.(\d{3,4})$")
 _LISTED = re.compile(r"name of channel (\d+)")
@@ -55,15 +39,7 @@ _TITLES = ("title", "type of the test", "laboratory test ref. number", "test nam
 def read(path: Path) -> CrashRecord:
     """Read a test; samples are read when a channel is used.
 
-    Parameters
-    ----------
-    path : Path
-        The ``.mme`` file, or the folder that holds it.
-
-    Raises
-    ------
-    DataError
-        No header, several headers, no channel, or a damaged header.
+    `path`: the ``.mme`` file, or the folder that holds it.
     """
     head = header_of(path, ".mme", "io.folder-holds-tests", "io.no-mme-file")
     header = read_header(head)
@@ -73,16 +49,14 @@ def read(path: Path) -> CrashRecord:
     absent = [n for n in listed if n not in numbered]
     if absent:
         shown = ", ".join(f"{n:03d}" for n in absent[:12]) + (" …" if len(absent) > 12 else "")
-        findings.append(
-            Finding(
-                "io.listed-channels-not-folder",
-                severity="note",
-                file=index.name if index else head.name,
-                quantity="channels",
-                count=len(absent),
-                count_2=len(listed),
-                value_shown=shown,
-            )
+        add_note(
+            findings,
+            "io.listed-channels-not-folder",
+            file=index.name if index else head.name,
+            quantity="channels",
+            count=len(absent),
+            count_2=len(listed),
+            value_shown=shown,
         )
     if not numbered:
         raise DataError("io.test-no-channel-files", file=head.name, quantity="channels")
@@ -136,14 +110,7 @@ def _index(head: Path, findings: list[Finding]) -> tuple[Path | None, dict[int, 
     ]
     same = [p for p in found if p.stem.lower() == head.stem.lower()] or found
     if not same:
-        findings.append(
-            Finding(
-                "io.no-index-channels-chn-files",
-                file=head.name,
-                quantity="channels",
-                severity="note",
-            )
-        )
+        add_note(findings, "io.no-index-channels-chn-files", file=head.name, quantity="channels")
         return None, {}
     index = same[0]
     if not _inside(index, head):
@@ -157,15 +124,14 @@ def _index(head: Path, findings: list[Finding]) -> tuple[Path | None, dict[int, 
     }
     promised = header.number("number of channels")
     if promised is not None and promised != len(listed):
-        findings.append(
-            Finding(
-                "io.promises-channels-lists",
-                file=index.name,
-                row=header.line("number of channels"),
-                quantity="number of channels",
-                promised=promised,
-                count=len(listed),
-            )
+        add_warning(
+            findings,
+            "io.promises-channels-lists",
+            file=index.name,
+            row=header.line("number of channels"),
+            quantity="number of channels",
+            promised=promised,
+            count=len(listed),
         )
     return index, listed
 
@@ -234,14 +200,13 @@ def _vehicles(header: MmeHeader, findings: list[Finding]) -> dict[str, dict[str,
         except DataError as error:
             # Unusable data of the vehicle only affects the report: keep the record.
             fault = error.finding
-            findings.append(
-                Finding(
-                    "io.left-out-unusable",
-                    file=fault.file,
-                    row=fault.row,
-                    quantity=fault.quantity,
-                    reason=fault,
-                )
+            add_warning(
+                findings,
+                "io.left-out-unusable",
+                file=fault.file,
+                row=fault.row,
+                quantity=fault.quantity,
+                reason=fault,
             )
     return vehicles
 
@@ -252,13 +217,7 @@ def _in_si(header: MmeHeader, key: str) -> float:
     unit = find_unit(text, ("velocity",)) if text and key.startswith("velocity") else None
     factor = FACTORS[unit[0]][unit[1]] if unit else 1.0 if text in _SI_OF[key.split()[0]] else None
     if value is None or factor is None:
-        raise DataError(
-            "io.no-number",
-            file=header.file,
-            row=header.line(key),
-            quantity=key,
-            text=header.text(key)[:60],
-        )
+        raise header.fault("io.no-number", key, text=header.text(key)[:60])
     return value * factor
 
 
@@ -311,56 +270,51 @@ def _point(file: MmeFile) -> str:
     return noted or (file.known.point if file.known else "")
 
 
-def _moves(known: MmeCode) -> bool:
-    return known.quantity in ("acceleration", "rate")
-
-
 def _told(file: MmeFile, listed: dict[int, str]) -> list[Finding]:
-    told = []
+    told: list[Finding] = []
     name = clean(file.path.name, LONGEST_NAME)
     number = int(file.path.suffix[1:])
     if file.known is None:
-        told.append(
-            Finding(
-                "io.channel-code-malformed" if file.code else "io.channel-code-missing",
-                file=name,
-                row=file.header.line("channel code"),
-                quantity="channel code",
-                word=file.code,
-            )
+        add_warning(
+            told,
+            "io.channel-code-malformed" if file.code else "io.channel-code-missing",
+            file=name,
+            row=file.header.line("channel code"),
+            quantity="channel code",
+            word=file.code,
         )
-    elif not file.known.listed and file.known.body == "vehicle" and _moves(file.known):
-        told.append(
-            Finding(
-                "io.location-code-unknown",
-                severity="note",
-                file=name,
-                row=file.header.line("channel code"),
-                quantity=f"channel {file.code}",
-                word=file.code[2:6],
-            )
+    elif (
+        not file.known.listed
+        and file.known.body == "vehicle"
+        and (file.known.quantity in ("acceleration", "rate"))
+    ):
+        add_note(
+            told,
+            "io.location-code-unknown",
+            file=name,
+            row=file.header.line("channel code"),
+            quantity=f"channel {file.code}",
+            word=file.code[2:6],
         )
     if is_bad(file):
-        told.append(
-            Finding(
-                "io.laboratory-gives-status",
-                file=name,
-                row=file.header.line("data status"),
-                quantity=f"channel {file.code or name}",
-                text=file.header.text("data status"),
-            )
+        add_warning(
+            told,
+            "io.laboratory-gives-status",
+            file=name,
+            row=file.header.line("data status"),
+            quantity=f"channel {file.code or name}",
+            text=file.header.text("data status"),
         )
     indexed = listed.get(number, "")
     if indexed and file.code and indexed.upper() != file.code.upper():
-        told.append(
-            Finding(
-                "io.index-file-says-taken",
-                file=name,
-                row=file.header.line("channel code"),
-                quantity="channel code",
-                indexed=indexed,
-                word=file.code,
-            )
+        add_warning(
+            told,
+            "io.index-file-says-taken",
+            file=name,
+            row=file.header.line("channel code"),
+            quantity="channel code",
+            indexed=indexed,
+            word=file.code,
         )
     return told
 
@@ -375,14 +329,8 @@ Array = NDArray[np.float64]
 class MmeFile:
     """One channel file.
 
-    Attributes
-    ----------
-    path : Path
-    header : MmeHeader
-    code : str
-        As given in the file or the index; empty if neither has one.
-    known : MmeCode or None
-        The decoded code, if valid.
+    `code`: as given in the file or the index; empty if neither has one. `known`: the decoded code,
+    if valid.
     """
 
     path: Path
@@ -436,13 +384,7 @@ def stamps_of(
             text = held.header.text("unit")
             unit = find_unit(text, OF_CRASHES) if text else ("time", "s")
             if unit is None or unit[0] != "time":
-                raise DataError(
-                    "io.holds-stamps-unit",
-                    file=held.path.name,
-                    row=held.header.line("unit"),
-                    quantity="unit",
-                    text=text[:40],
-                )
+                raise held.header.fault("io.holds-stamps-unit", "unit", text=text[:40])
             stamps = read_samples(held.path, held.header, f"channel {clock}")
             if stamps.size != count:
                 raise DataError(
@@ -471,15 +413,9 @@ def stamps_of(
     def even(count: int) -> Array:
         interval = header.number("sampling interval")
         if interval is None or not interval > 0.0:
-            raise DataError(
-                "io.sampling-interval-not-stated"
-                if interval is None
-                else "io.sampling-interval-none",
-                file=file.path.name,
-                row=header.line("sampling interval"),
-                quantity="sampling interval",
-                interval=interval,
-            )
+            missing = "io.sampling-interval-not-stated"
+            code = missing if interval is None else "io.sampling-interval-none"
+            raise header.fault(code, "sampling interval", interval=interval)
         first = "0"
         if header.number("time of first sample") is not None:
             first = header.text("time of first sample").split()[0]
@@ -667,17 +603,9 @@ _MISSING = ("novalue", "nan")
 class MmeHeader:
     """Lines of a header.
 
-    Attributes
-    ----------
-    file : str
-        For messages.
-    values : dict of str to (str, int)
-        Key in lower case with single blanks to its value and line; the first of repeated
-        keys.
-    more : dict of str to list of str
-        All values of each key.
-    end : int
-        Number of lines before the samples.
+    `file`: for messages. `values`: key in lower case with single blanks to its value and line; the
+    first of repeated keys. `more`: all values of each key. `end`: number of lines before the
+    samples.
     """
 
     file: str
@@ -699,6 +627,10 @@ class MmeHeader:
         """Return the line number of a key."""
         return self.values[key][1] if key in self.values else None
 
+    def fault(self, code: str, key: str, **data: Any) -> DataError:
+        """Make the error for the value of a key."""
+        return DataError(code, file=self.file, row=self.line(key), quantity=key, **data)
+
     def number(self, key: str) -> float | None:
         """Return the value of a key as a number, with or without a unit after it.
 
@@ -709,9 +641,7 @@ class MmeHeader:
             return None
         value = read_number(text.split()[0])
         if value is None or not np.isfinite(value):
-            raise DataError(
-                "io.no-number", file=self.file, row=self.line(key), quantity=key, text=text[:60]
-            )
+            raise self.fault("io.no-number", key, text=text[:60])
         return value
 
 

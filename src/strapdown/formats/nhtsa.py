@@ -11,17 +11,15 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats.crash_record import header_of
 from strapdown.units import FACTORS, SPEEDS, TIME_UNITS, find_unit, si_of
-
-__all__ = ["Channel", "CrashTest", "Vehicle", "read_nhtsa"]
-
 
 TEST_FIELDS, CHANNEL_FIELDS, VEHICLE_FIELDS = 20, 20, 42
 MM = 1e-3
@@ -31,22 +29,9 @@ MM = 1e-3
 class Vehicle:
     """A vehicle of a test, in SI units; NaN where not stated.
 
-    Attributes
-    ----------
-    number : int
-    year : int or None
-        None where not stated.
-    make, model, body : str
-        Codes of the database.
-    vin : str
-    mass : float, kg
-        As tested.
-    wheelbase, length, width : float, m
-    cg_behind_front_axle : float, m
-    speed : float, m/s
-        Before the impact.
-    crab_deg : float, deg
-        Between its heading and its direction of travel.
+    `year`: none where not stated. `make`, `model`, `body`: codes of the database. `mass`: as
+    tested. `wheelbase`, `length`, `width` (m). `cg_behind_front_axle` (m). `speed` (m/s): before
+    the impact. `crab_deg` (deg): between its heading and its direction of travel.
     """
 
     number: int
@@ -136,70 +121,60 @@ def read_nhtsa(path: str | Path) -> CrashTest:
     """
     file = header_of(Path(path), ".ev5", "io.folder-holds-headers", "io.folder-holds-no-ev-header")
     rows = sections(file)
-    test, line = only(rows, "TEST", file)
-    if len(test) < TEST_FIELDS:
-        raise row_error(file, line, "TEST", len(test), TEST_FIELDS)
-    promised = to_whole(test[18], file, line, "count of curves")
-    listed = rows["INSTRUMENTATION"]
-    if promised != len(listed):
+    if len(rows["TEST"]) != 1:
         raise DataError(
-            "io.promises-curves-lists",
+            "io.rows-section-needed",
             file=file.name,
-            row=line,
-            quantity="count of curves",
-            promised=promised,
-            count=len(listed),
+            quantity="TEST",
+            count=len(rows["TEST"]),
+            section="TEST",
+        )
+    test, listed = rows["TEST"][0], rows["INSTRUMENTATION"]
+    if len(test.fields) < TEST_FIELDS:
+        raise test.of_width("TEST", TEST_FIELDS)
+    promised = test.whole(18, "count of curves")
+    if promised != len(listed):
+        raise test.fault(
+            "io.promises-curves-lists", "count of curves", promised=promised, count=len(listed)
         )
     present = {p.name.lower(): p for p in file.parent.iterdir()}
-    channels = tuple(_channel(fields, file, at, present) for fields, at in listed)
-    _refuse_twins(channels, file, [at for _, at in listed])
+    channels = tuple(_channel(row, present) for row in listed)
+    seen: set[int] = set()
+    for row, channel in zip(listed, channels, strict=True):
+        if channel.number in seen:
+            raise row.fault("io.channel-listed-twice", "channel", number=channel.number)
+        seen.add(channel.number)
     return CrashTest(
         file,
-        title=test[1],
-        objective=test[2],
-        date=test[3],
-        performer=test[4],
-        reference=test[6],
-        comment=test[19],
-        closing_speed=to_number(test[14], file, line, "closing speed") * KMH,
-        impact_angle_deg=to_number(test[15], file, line, "impact angle"),
-        vehicles=tuple(_vehicle(fields, file, at) for fields, at in rows["VEHICLE"]),
+        title=test.fields[1],
+        objective=test.fields[2],
+        date=test.fields[3],
+        performer=test.fields[4],
+        reference=test.fields[6],
+        comment=test.fields[19],
+        closing_speed=test.number(14, "closing speed", KMH),
+        impact_angle_deg=test.number(15, "impact angle"),
+        vehicles=tuple(_vehicle(row) for row in rows["VEHICLE"]),
         channels=channels,
-        occupants=tuple(tuple(fields) for fields, _ in rows["OCCUPANT"]),
-        restraints=tuple(tuple(fields) for fields, _ in rows["RESTRAINT"]),
-        barrier=tuple(tuple(fields) for fields, _ in rows["BARRIER"]),
+        occupants=tuple(row.fields for row in rows["OCCUPANT"]),
+        restraints=tuple(row.fields for row in rows["RESTRAINT"]),
+        barrier=tuple(row.fields for row in rows["BARRIER"]),
         findings=tuple(_findings(channels, file)),
     )
 
 
-def _channel(fields: list[str], file: Path, line: int, present: dict[str, Path]) -> Channel:
+def _channel(row: _Row, present: dict[str, Path]) -> Channel:
+    fields = row.fields
     if len(fields) != CHANNEL_FIELDS:
-        raise row_error(file, line, "INSTRUMENTATION", len(fields), CHANNEL_FIELDS)
-
-    def number(at: int, what: str) -> float:
-        return to_number(fields[at], file, line, what)
-
-    def whole(at: int, what: str) -> int:
-        return to_whole(fields[at], file, line, what)
-
-    curve = whole(1, "channel")
-    first, last, interval = (
-        whole(14, "first sample"),
-        whole(15, "last sample"),
-        number(16, "interval"),
-    )
+        raise row.of_width("INSTRUMENTATION", CHANNEL_FIELDS)
+    curve = row.whole(1, "channel")
+    first, last = row.whole(14, "first sample"), row.whole(15, "last sample")
+    interval = row.number(16, "interval")
     if last < first or not interval > 0.0:
-        raise DataError(
-            "io.samples-every-no-record",
-            file=file.name,
-            row=line,
-            quantity=f"channel {curve}",
-            first=first,
-            last=last,
-            interval=interval,
-        )
+        data = {"first": first, "last": last, "interval": interval}
+        raise row.fault("io.samples-every-no-record", f"channel {curve}", **data)
     return Channel(
-        vehicle=whole(0, "vehicle"),
+        vehicle=row.whole(0, "vehicle"),
         number=curve,
         kind=fields[2],
         occupant=fields[3],
@@ -207,75 +182,56 @@ def _channel(fields: list[str], file: Path, line: int, present: dict[str, Path])
         axis=fields[5],
         time_unit=fields[6].upper(),
         unit=fields[7],
-        prefilter_hz=number(8, "prefilter"),
+        prefilter_hz=row.number(8, "prefilter"),
         maker=fields[9],
         calibrated=fields[10],
-        rating=number(11, "rating"),
-        used_percent=number(12, "share of the rating used"),
-        initial_velocity=number(13, "initial velocity") * KMH,
+        rating=row.number(11, "rating"),
+        used_percent=row.number(12, "share of the rating used"),
+        initial_velocity=row.number(13, "initial velocity", KMH),
         first=first,
         last=last,
         interval=interval * 1e-6,
         status=fields[17],
         primary=fields[18].upper() != "R",
         comment=fields[19],
-        path=present.get(f"{file.stem.lower()}.{curve:03d}"),
+        path=present.get(f"{row.file.stem.lower()}.{curve:03d}"),
     )
 
 
-def _vehicle(fields: list[str], file: Path, line: int) -> Vehicle:
+def _vehicle(row: _Row) -> Vehicle:
+    fields = row.fields
     if len(fields) < VEHICLE_FIELDS:
-        raise row_error(file, line, "VEHICLE", len(fields), VEHICLE_FIELDS)
-
-    def number(at: int, what: str, factor: float = 1.0) -> float:
-        return to_number(fields[at], file, line, what) * factor
-
-    year = number(3, "year")
+        raise row.of_width("VEHICLE", VEHICLE_FIELDS)
+    year = row.number(3, "year")
     return Vehicle(
-        number=to_whole(fields[0], file, line, "vehicle"),
+        number=row.whole(0, "vehicle"),
         make=fields[1],
         model=fields[2],
         year=None if math.isnan(year) else int(year),
         body=fields[5],
         vin=fields[6],
-        mass=number(10, "test mass"),
-        wheelbase=number(12, "wheelbase", MM),
-        length=number(13, "length", MM),
-        width=number(14, "width", MM),
-        cg_behind_front_axle=number(15, "center of gravity", MM),
-        speed=number(41, "speed", KMH),
-        crab_deg=number(42, "crab angle") if len(fields) > VEHICLE_FIELDS else math.nan,
+        mass=row.number(10, "test mass"),
+        wheelbase=row.number(12, "wheelbase", MM),
+        length=row.number(13, "length", MM),
+        width=row.number(14, "width", MM),
+        cg_behind_front_axle=row.number(15, "center of gravity", MM),
+        speed=row.number(41, "speed", KMH),
+        crab_deg=row.number(42, "crab angle") if len(fields) > VEHICLE_FIELDS else math.nan,
     )
 
 
-def _refuse_twins(channels: tuple[Channel, ...], file: Path, lines: list[int]) -> None:
-    seen: set[int] = set()
-    for channel, line in zip(channels, lines, strict=True):
-        if channel.number in seen:
-            raise DataError(
-                "io.channel-listed-twice",
-                file=file.name,
-                row=line,
-                quantity="channel",
-                number=channel.number,
-            )
-        seen.add(channel.number)
-
-
 def _findings(channels: tuple[Channel, ...], file: Path) -> list[Finding]:
-    findings = []
+    findings: list[Finding] = []
     absent = [c.number for c in channels if not c.present]
     if absent:
-        findings.append(
-            Finding(
-                "io.listed-channels-not-folder-2",
-                severity="note",
-                file=file.name,
-                quantity="channels",
-                count=len(absent),
-                count_2=len(channels),
-                ranges=_ranges(absent),
-            )
+        add_note(
+            findings,
+            "io.listed-channels-not-folder-2",
+            file=file.name,
+            quantity="channels",
+            count=len(absent),
+            count_2=len(channels),
+            ranges=_ranges(absent),
         )
     findings += [
         Finding(
@@ -310,8 +266,46 @@ SECTIONS = ("EV5", "TEST", "VEHICLE", "BARRIER", "OCCUPANT", "RESTRAINT", "INSTR
 LARGEST_HEADER = 50_000_000
 
 
-def sections(file: Path) -> dict[str, list[tuple[list[str], int]]]:
-    """Split a header into sections: rows of fields, with their line numbers.
+@dataclass(frozen=True)
+class _Row:
+    """Fields of a line of a header, which bars separate."""
+
+    fields: tuple[str, ...]
+    file: Path
+    line: int
+
+    def number(self, at: int, what: str, factor: float = 1.0) -> float:
+        """Convert a field to a number, NaN if not stated; refuse other text."""
+        text = self.fields[at]
+        if text in ("", "NA", "UN"):
+            return math.nan
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.inf
+        if not math.isfinite(value):
+            raise self.fault("io.no-number-4", what, text=text)
+        return value * factor
+
+    def whole(self, at: int, what: str) -> int:
+        """Convert a field to an integer; refuse other text or an empty field."""
+        value = self.number(at, what)
+        if not math.isfinite(value) or value != int(value):
+            raise self.fault("io.no-number-4", what, text=self.fields[at])
+        return int(value)
+
+    def fault(self, code: str, quantity: str, **data: Any) -> DataError:
+        """Make an error of this line."""
+        return DataError(code, file=self.file.name, row=self.line, quantity=quantity, **data)
+
+    def of_width(self, section: str, needed: int) -> DataError:
+        """Make the error for a row with too few or too many fields."""
+        data = {"found": len(self.fields), "section": section, "needed": needed}
+        return self.fault("io.fields-between-bars-row", section, **data)
+
+
+def sections(file: Path) -> dict[str, list[_Row]]:
+    """Split a header into sections of rows.
 
     DataError: the file is missing, empty, far too large, truncated, or in another format.
     """
@@ -322,7 +316,7 @@ def sections(file: Path) -> dict[str, list[tuple[list[str], int]]]:
         raise DataError(
             "io.file-empty-5" if not size else "io.bytes-no-ev-header", file=file.name, size=size
         )
-    rows: dict[str, list[tuple[list[str], int]]] = {name: [] for name in SECTIONS}
+    rows: dict[str, list[_Row]] = {name: [] for name in SECTIONS}
     section = ""
     seen: set[str] = set()
     for k, line in enumerate(file.read_bytes().decode("latin-1").splitlines(), start=1):
@@ -345,65 +339,12 @@ def sections(file: Path) -> dict[str, list[tuple[list[str], int]]]:
         elif section in ("", "EV5", "END"):
             raise DataError("io.stands-no-section", file=file.name, row=k, text=text[:40])
         else:
-            rows[section].append(([f.strip() for f in line.split("|")], k))
+            fields = tuple(f.strip() for f in line.split("|"))
+            rows[section].append(_Row(fields, file, k))
     missing = [name for name in ("EV5", "TEST", "INSTRUMENTATION", "END") if name not in seen]
     if missing:
         raise DataError("io.no-section", file=file.name, quantity="section", missing=missing)
     return rows
-
-
-def only(
-    rows: dict[str, list[tuple[list[str], int]]], section: str, file: Path
-) -> tuple[list[str], int]:
-    """Return the only row of a section, with its line; refuse any other number of rows."""
-    if len(rows[section]) != 1:
-        raise DataError(
-            "io.rows-section-needed",
-            file=file.name,
-            quantity=section,
-            count=len(rows[section]),
-            section=section,
-        )
-    return rows[section][0]
-
-
-def to_number(text: str, file: Path, line: int, what: str) -> float:
-    """Convert a field to a number, NaN if not stated; refuse other text."""
-    if text in ("", "NA", "UN"):
-        return math.nan
-    try:
-        value = float(text)
-    except ValueError:
-        raise bad_number(text, file, line, what) from None
-    if not math.isfinite(value):
-        raise bad_number(text, file, line, what)
-    return value
-
-
-def to_whole(text: str, file: Path, line: int, what: str) -> int:
-    """Convert a field to an integer; refuse other text or an empty field."""
-    value = to_number(text, file, line, what)
-    if not math.isfinite(value) or value != int(value):
-        raise bad_number(text, file, line, what)
-    return int(value)
-
-
-def bad_number(text: str, file: Path, line: int, what: str) -> DataError:
-    """Make the error for a field that is not a number."""
-    return DataError("io.no-number-4", file=file.name, row=line, quantity=what, text=text)
-
-
-def row_error(file: Path, line: int, section: str, found: int, needed: int) -> DataError:
-    """Make the error for a row with too few or too many fields."""
-    return DataError(
-        "io.fields-between-bars-row",
-        file=file.name,
-        row=line,
-        quantity=section,
-        found=found,
-        section=section,
-        needed=needed,
-    )
 
 
 KMH = SPEEDS["km/h"]
@@ -485,6 +426,13 @@ class Channel:
         """Number and comment, for messages and tables."""
         return f"channel {self.number} ({self.comment})"
 
+    def _fault(self, code: str, row: int | None = None, **data: Any) -> DataError:
+        """Make an error of its file, by default about its samples."""
+        file = None if self.path is None else self.path.name
+        return DataError(
+            code, row=row, **{"file": file, "quantity": f"channel {self.number}"} | data
+        )
+
     @property
     def present(self) -> bool:
         """Whether the folder holds its samples."""
@@ -531,19 +479,15 @@ class Channel:
     def recorded(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Stamps in s from the impact, and samples in the unit as recorded."""
         if self.path is None:
-            raise DataError(
-                "io.listed-header-file-not-folder",
-                quantity=f"channel {self.number}",
-                name=self.name,
-            )
+            raise self._fault("io.listed-header-file-not-folder", name=self.name)
         known = find_unit(self.time_unit, ("time",))
         if known is None:
-            raise DataError(
+            unit = self.time_unit
+            raise self._fault(
                 "io.time-unit-not-known",
-                file=self.path.name,
                 quantity="time",
-                time_unit=self.time_unit,
-                word=self.time_unit,
+                time_unit=unit,
+                word=unit,
                 known=TIME_UNITS,
             )
         pairs = _read_pairs(self)
@@ -554,10 +498,8 @@ class Channel:
     def _si(self) -> tuple[str, float]:
         found = si_of(self.unit, KINDS)
         if found is None:
-            raise DataError(
+            raise self._fault(
                 "io.unit-not-known",
-                file=self.path.name if self.path else None,
-                quantity=f"channel {self.number}",
                 unit=self.unit,
                 name=self.name,
                 word=self.unit.upper(),
@@ -571,44 +513,27 @@ def _read_pairs(channel: Channel) -> np.ndarray[tuple[int, int], np.dtype[np.flo
     assert path is not None
     size = path.stat().st_size
     if size == 0:
-        raise DataError("io.file-empty-4", file=path.name, quantity=f"channel {channel.number}")
+        raise channel._fault("io.file-empty-4")
     if size > LONGEST_ROW * (channel.samples + 1):
-        raise DataError(
-            "io.bytes-too-many-samples-header",
-            file=path.name,
-            quantity=f"channel {channel.number}",
-            size=size,
-            samples=channel.samples,
-        )
+        raise channel._fault("io.bytes-too-many-samples-header", size=size, samples=channel.samples)
     lines = path.read_bytes().decode("ascii", "replace").splitlines()
     pairs: list[tuple[float, float]] = []
     for k, line in enumerate(lines):
         try:
             time, value = map(float, line.split())
         except ValueError:
-            raise DataError(
-                "io.not-time-value",
-                file=path.name,
-                row=k + 1,
-                quantity=f"channel {channel.number}",
-                at_line=line[:60],
-            ) from None
+            raise channel._fault("io.not-time-value", k + 1, at_line=line[:60]) from None
         if not (math.isfinite(time) and math.isfinite(value)):
-            raise DataError(
-                "io.not-finite-number-3",
-                file=path.name,
-                row=k + 1,
-                quantity="time" if not math.isfinite(time) else f"channel {channel.number}",
-                strip=line.strip()[:60],
+            of_time = {} if math.isfinite(time) else {"quantity": "time"}
+            raise channel._fault(
+                "io.not-finite-number-3", k + 1, **of_time, strip=line.strip()[:60]
             )
         pairs.append((time, value))
     if len(lines) != channel.samples:
         cut = len(lines) < channel.samples
-        raise DataError(
+        raise channel._fault(
             "io.samples-header-row-says" if cut else "io.samples-header-row-says-2",
-            file=path.name,
-            row=len(lines) if cut else channel.samples + 1,
-            quantity=f"channel {channel.number}",
+            len(lines) if cut else channel.samples + 1,
             count=len(lines),
             samples=channel.samples,
             first=channel.first,
@@ -618,27 +543,19 @@ def _read_pairs(channel: Channel) -> np.ndarray[tuple[int, int], np.dtype[np.flo
 
 
 def _check_time(channel: Channel, time: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
-    assert channel.path is not None
     steps = np.diff(time)
     back = np.flatnonzero(steps <= 0.0)
     if back.size:
         k = int(back[0]) + 1
-        raise DataError(
-            "io.time-goes-4",
-            file=channel.path.name,
-            row=k + 1,
-            quantity="time",
-            time=time[k - 1],
-            time_2=time[k],
-        )
+        pair = {"time": time[k - 1], "time_2": time[k]}
+        raise channel._fault("io.time-goes-4", k + 1, quantity="time", **pair)
     expected = channel.interval * (channel.first + np.arange(time.size))
     off = np.flatnonzero(np.abs(time - expected) > STAMP_ROUNDING)
     if off.size:
         k = int(off[0])
-        raise DataError(
+        raise channel._fault(
             "io.stamp-header-sample-every",
-            file=channel.path.name,
-            row=k + 1,
+            k + 1,
             quantity="time",
             time=time[k],
             first=channel.first + k,

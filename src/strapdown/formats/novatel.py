@@ -34,10 +34,10 @@ import pandas as pd
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK, Clock
-from strapdown.formats.known_formats import Quantities, damage, solution
+from strapdown.formats.known_formats import Quantities, damage, or_sentences, solution
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.units import LENGTHS
@@ -77,11 +77,6 @@ WEEK_MS = 604_800_000
 Frames = dict[int, list[tuple[int, bytes]]]
 
 
-def _has_messages(path: Path) -> bool:
-    """Whether two frames with their CRC are among the first bytes."""
-    return sum(map(len, _frames(first_bytes(path, 8192))[0].values())) >= 2
-
-
 #: Messages as text: number, layout of the binary message, and which of the fields of a line are
 #: its values. Fields that are words or hexadecimal are in `_WORDS` and `_HEX`.
 TEXTS: dict[str, tuple[int, str]] = {
@@ -119,7 +114,8 @@ _LINE = re.compile(
 
 detect = Signs(
     first=rb"\xaa\x44[\x12\x13]|(?m:^[#%](?:BESTPOS|BESTVEL|INSPVA|RAWIMU)S?X?A,)",
-    also=_has_messages,
+    # Two frames with their CRC.
+    also=lambda path: sum(map(len, _frames(first_bytes(path, 8192))[0].values())) >= 2,
 )
 
 
@@ -199,7 +195,7 @@ def _read(path: Path, stream: str) -> tuple[Frames, list[Finding]]:
         frames, lost = _frames(path.read_bytes())
     findings: list[Finding] = []
     if lost:
-        findings.append(Finding("io.bytes-left-out", file=path.name, severity="note", count=lost))
+        add_note(findings, "io.bytes-left-out", file=path.name, count=lost)
     if not any(kind in frames for kind in STREAMS[stream]):
         if stream == "imu" and any(kind in frames for kind in CORRECTED):
             raise DataError("io.novatel-corrected-only", file=path.name, quantity="imu")
@@ -240,6 +236,7 @@ def read(path: Path) -> RawLog:
     )
 
 
+@or_sentences
 def read_fixes(path: Path) -> RawLog:
     """Read BESTPOS, with the velocity of BESTVEL at the same instants."""
     frames, findings = _read(path, "gnss")
@@ -249,13 +246,13 @@ def read_fixes(path: Path) -> RawLog:
     kept = [r for r in rows if r[1] == 0 and r[2] != 0]
     if len(kept) < len(rows):
         code, count = "io.fixes-without-position-left-out", len(rows) - len(kept)
-        findings.append(Finding(code, file=path.name, severity="note", count=count))
+        add_note(findings, code, file=path.name, count=count)
     if not kept:
         raise DataError("io.no-usable-fix", file=path.name, quantity="lat, lon")
     table = np.array(kept, dtype=np.float64)
     if count := int(np.isin(table[:, 2], FUSED).sum()):
         code = "io.fixes-of-fused-receiver"
-        findings.append(Finding(code, file=path.name, severity="note", count=count))
+        add_note(findings, code, file=path.name, count=count)
     stamps = np.array([r[0] for r in kept], dtype=np.int64)
     time, week = stamps % WEEK_MS, stamps // WEEK_MS
     out: Quantities = {"time": (time, "ms"), "week": (week, None)}
@@ -272,7 +269,7 @@ def read_fixes(path: Path) -> RawLog:
         late = max((v[2] for v in velocities.values()), default=0.0)
         if late > 0.0:
             code = "io.velocity-late"
-            findings.append(Finding(code, file=path.name, severity="note", late=late))
+            add_note(findings, code, file=path.name, late=late)
         out |= {f"V{a}": (ned[:, k], "m/s") for k, a in enumerate("NED")}
     return RawLog.of(path, out, clock=GPS, findings=findings)
 
@@ -325,7 +322,7 @@ detect_explorer = Signs(
 )
 
 
-def read_explorer(path: Path) -> pd.DataFrame:
+def read_explorer_reference(path: Path) -> pd.DataFrame:
     """Read position, velocity and attitude."""
     with damage(path):
         text, findings = csv.decoded(path.read_bytes(), path.name)

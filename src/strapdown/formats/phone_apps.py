@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, add_note
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.columns import read_name
@@ -25,7 +25,6 @@ from strapdown.formats.known_formats import (
     optional,
     selected,
     sensor_log,
-    split,
     stated_by,
     under,
 )
@@ -50,12 +49,10 @@ WORDS = {
 }
 
 
-def _has_vectors(path: Path) -> bool:
-    """Whether the first line names the three vectors."""
-    return csv.detect(path) and len(_named(names_of(path))) == 9
-
-
-detect_core_motion = Signs(text=r"(?i)\A.*grav", also=_has_vectors)
+# The first line names the three vectors.
+detect_core_motion = Signs(
+    text=r"(?i)\A.*grav", also=lambda path: csv.detect(path) and len(_named(names_of(path))) == 9
+)
 
 
 def _named(names: list[str]) -> dict[str, str]:
@@ -70,13 +67,7 @@ def _named(names: list[str]) -> dict[str, str]:
 
 
 def read_core_motion(path: Path) -> RawLog:
-    """Read the rates, and specific force from gravity and user acceleration.
-
-    Raises
-    ------
-    DataError
-        The table is damaged, or a value is not a number.
-    """
+    """Read the rates, and specific force from gravity and user acceleration."""
     raw = under(path)
     named = _named(list(raw.columns))
     missing = [f"{v}_{a}" for v in WORDS for a in "xyz" if f"{v}_{a}" not in named]
@@ -112,16 +103,14 @@ def with_force_summed(raw: RawLog) -> RawLog:
         held[f"gyro_{axis}"] = (gyro[:, k], "rad/s")
         held[f"accel_{axis}"] = (gravity[:, k] + user[:, k], unit)
     log = stated_by(raw, held, axes=AXES)
-    log.findings.append(
-        Finding(
-            "io.force-summed",
-            file=raw.name,
-            quantity="accel",
-            severity="note",
-            linear=named["user_x"],
-            gravity=named["gravity_x"],
-            distance=0.0,
-        )
+    add_note(
+        log.findings,
+        "io.force-summed",
+        file=raw.name,
+        quantity="accel",
+        linear=named["user_x"],
+        gravity=named["gravity_x"],
+        distance=0.0,
     )
     return log
 
@@ -157,14 +146,12 @@ def read_physics_toolbox(path: Path) -> RawLog:
         )
     log = stated_by(raw, {"time": (_time(raw), "s"), **held}, axes=AXES, clock=RELATIVE)
     if "ax" in raw.columns:
-        log.findings.append(
-            Finding(
-                "io.linear-acceleration-not-used",
-                file=path.name,
-                quantity="accel",
-                severity="note",
-                source="ax, ay, az",
-            )
+        add_note(
+            log.findings,
+            "io.linear-acceleration-not-used",
+            file=path.name,
+            quantity="accel",
+            source="ax, ay, az",
         )
     return log
 
@@ -194,13 +181,8 @@ def _time(raw: RawLog) -> NDArray[np.float64]:
                 3600 * hours + 60 * minutes + seconds + float(f"0.{parts[3]}" if parts[3:] else 0)
             )
         except ValueError:
-            raise DataError(
-                "io.value-not-a-number",
-                file=raw.name,
-                row=raw.row(k),
-                quantity="time",
-                values=text,
-                source="time",
+            raise raw.fault(
+                "io.value-not-a-number", "time", sample=k, values=text, source="time"
             ) from None
     return np.asarray(out + 86400.0 * np.cumsum(np.diff(out, prepend=out[0]) < -43200.0))
 
@@ -234,20 +216,19 @@ MATLAB_MOBILE_FIXES: dict[str, tuple[str, str | None]] = {
 _DATE = "%d-%b-%Y %H:%M:%S.%f"
 
 
-def _has_tables(folder: Path) -> bool:
-    """Whether a folder has tables whose stamps have the months of MATLAB's dates."""
-    return any(_table_of_matlab_mobile(folder, name) for name in ("AngularVelocity", "Position"))
+# Tables whose stamps have the months of MATLAB's dates.
+detect_matlab_mobile = Signs(
+    folder=lambda path: any(
+        _table_of_matlab_mobile(path, name) for name in ("AngularVelocity", "Position")
+    )
+)
 
 
-detect_matlab_mobile = Signs(folder=_has_tables)
-
-
-def _has_objects(path: Path) -> bool:
-    """Whether there are objects of MATLAB, which nothing else opens."""
-    return any(kind == "opaque" for _, kind in contents_of_matlab(path))
-
-
-detect_matlab_mobile_objects = Signs(suffixes=(".mat",), also=_has_objects)
+# Objects of MATLAB, which nothing else opens.
+detect_matlab_mobile_objects = Signs(
+    suffixes=(".mat",),
+    also=lambda path: any(kind == "opaque" for _, kind in contents_of_matlab(path)),
+)
 
 
 def refuse_matlab_mobile(path: Path) -> RawLog:
@@ -383,7 +364,7 @@ def _table_of_racechrono(path: Path) -> tuple[RawLog, dict[str, str]]:
     top = next((k for k, line in enumerate(lines) if line.startswith("timestamp,")), None)
     if top is None or len(lines) < top + 3 or not lines[top + 1].startswith("unix time"):
         raise DataError("io.racechrono-header", file=path.name, row=(top or 0) + 1)
-    names, units, sources = (split(lines[top + k], ",") for k in range(3))
+    names, units, sources = (csv.fields_of(lines[top + k], ",") for k in range(3))
     if not len(names) == len(units) == len(sources):
         raise DataError("io.racechrono-header", file=path.name, row=top + 1)
     full = [

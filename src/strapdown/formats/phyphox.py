@@ -14,11 +14,12 @@ velocity or direction.
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_warning
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE
 from strapdown.formats.columns import read_name
@@ -87,13 +88,7 @@ detect = Signs(
 
 
 def read(path: Path) -> RawLog:
-    """Read gyro, specific force and magnetic field, joined on the stamps of the gyro.
-
-    Raises
-    ------
-    DataError
-        A file is damaged, or the gyroscope is missing.
-    """
+    """Read gyro, specific force and magnetic field, joined on the stamps of the gyro."""
     name = path.resolve().name
     members = _members(path)
     logs, files, findings = [], [], []
@@ -110,16 +105,6 @@ def read(path: Path) -> RawLog:
     raw = join(_mention_linear(logs), name, unique, rows_of_member=True)
     raw.findings[:0] = findings
     return raw
-
-
-def read_fixes(path: Path) -> RawLog:
-    """Read the fixes of the location; the height is over the geoid."""
-    return _read_stream(path, "gnss")
-
-
-def read_barometer(path: Path) -> RawLog:
-    """Read the pressure."""
-    return _read_stream(path, "barometer")
 
 
 def _read_stream(path: Path, stream: str) -> RawLog:
@@ -139,6 +124,10 @@ def _read_stream(path: Path, stream: str) -> RawLog:
                 stated[column] = (quantity, unit)
     raw.stated, raw.clock = stated, RELATIVE
     return raw
+
+
+read_fixes = partial(_read_stream, stream="gnss")
+read_barometer = partial(_read_stream, stream="barometer")
 
 
 def _members(path: Path) -> list[Member]:
@@ -193,9 +182,7 @@ def _mention_linear(logs: list[RawLog]) -> list[RawLog]:
     wanted = {f"{triad}_{a}" for triad in _TRIADS for a in XYZ}
     for log in logs:
         if not any(q in wanted for q, _ in log.stated.values()):
-            log.findings.append(
-                Finding("io.left-out-acceleration-without-gravity", file=log.name, quantity="accel")
-            )
+            log.warn("io.left-out-acceleration-without-gravity", quantity="accel")
     return logs
 
 
@@ -208,17 +195,16 @@ def _pauses(member: Member) -> list[Finding]:
         wall = np.asarray(table["system time"], dtype=np.float64)
     except (DataError, KeyError, ValueError, TypeError):
         return [Finding("io.left-out-no-starts-pauses", file=member.label, severity="note")]
-    out = []
+    out: list[Finding] = []
     for k in range(1, len(events)):
         if events[k - 1] == "PAUSE" and events[k] == "START":
-            out.append(
-                Finding(
-                    "io.recording-paused",
-                    file=member.label,
-                    row=k + 2,
-                    quantity="time",
-                    wall=wall[k] - wall[k - 1],
-                    clock=clock[k],
-                )
+            add_warning(
+                out,
+                "io.recording-paused",
+                file=member.label,
+                row=k + 2,
+                quantity="time",
+                wall=wall[k] - wall[k - 1],
+                clock=clock[k],
             )
     return out

@@ -16,10 +16,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.earth import radii_of_curvature
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats.clocks import GPS, RELATIVE, WEEK, Clock, gps_from_unix
 from strapdown.formats.join import join
-from strapdown.formats.known_formats import Quantities, damage, solution
+from strapdown.formats.known_formats import Quantities, damage, or_sentences, solution
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.frames import C_ne, geodetic_from_ecef
@@ -98,14 +98,14 @@ def _solved(path: Path, stream: str) -> tuple[list[Any], Quantities, list[Findin
         week = np.array([_week(m) for m in fixed])
     if not fixed:
         raise DataError("io.no-usable-fix", file=path.name, quantity="lat, lon")
-    findings = []
+    findings: list[Finding] = []
     if lost := len(messages) - len(fixed):
         code = "io.fixes-without-position-left-out"
-        findings.append(Finding(code, file=path.name, severity="note", count=lost))
+        add_note(findings, code, file=path.name, count=lost)
     if any(m.fixType in (1, 4) for m in fixed):
         count = sum(m.fixType in (1, 4) for m in fixed)
         code = "io.fixes-of-fused-receiver"
-        findings.append(Finding(code, file=path.name, severity="note", count=count))
+        add_note(findings, code, file=path.name, count=count)
     times: Quantities = {"time": (tow, "ms")}
     if np.isfinite(week).all():
         times["week"] = (week, None)
@@ -127,6 +127,7 @@ def _week(message: Any) -> float:
     return float(np.round((gps_from_unix(unix)[0] - message.iTOW * 1e-3) / WEEK))
 
 
+@or_sentences
 def read_ubx_fixes(path: Path) -> RawLog:
     """Read the fixes, at GPS seconds of week."""
     fixed, out, findings = _solved(path, "gnss")
@@ -301,6 +302,7 @@ def _read(path: Path, stream: str) -> Blocks:
     return found
 
 
+@or_sentences
 def read_sbf_fixes(path: Path) -> RawLog:
     """Read position, velocity and their standard deviations."""
     found = _read(path, "gnss")
@@ -334,10 +336,10 @@ def read_sbf_fixes(path: Path) -> RawLog:
         sd = np.sqrt(np.diagonal(variance, axis1=1, axis2=2))
         if np.isfinite(sd).any():
             out |= {n: (sd[:, k], unit) for k, n in enumerate(names)}
-    findings = []
+    findings: list[Finding] = []
     if lost := len(rows) - len(use):
         code = "io.fixes-without-position-left-out"
-        findings.append(Finding(code, file=path.name, severity="note", count=lost))
+        add_note(findings, code, file=path.name, count=lost)
     return RawLog.of(path, out, clock=GPS, findings=findings)
 
 
@@ -419,9 +421,9 @@ def _has_records(path: Path) -> bool:
 detect_sbet = Signs(first=rb"\A.{7}[\x3f-\x41]", also=_has_records)
 
 
-def read_sbet(path: Path) -> pd.DataFrame:
+def read_sbet_reference(path: Path) -> pd.DataFrame:
     """Read position, velocity and attitude."""
-    findings = []
+    findings: list[Finding] = []
     with damage(path):
         values = np.frombuffer(path.read_bytes(), dtype="<f8").reshape(-1, FIELDS)
         bad = ~np.isfinite(values[:, : MOST.size]).all(axis=1)
@@ -441,7 +443,7 @@ def read_sbet(path: Path) -> pd.DataFrame:
             raise DataError("io.sbet-velocity", file=path.name, quantity="velocity")
         if apart[1] < 0.5 * apart[0]:
             ned = plain
-            findings.append(Finding("io.sbet-north-east-down", file=path.name, severity="note"))
+            add_note(findings, "io.sbet-north-east-down", file=path.name)
     euler = np.degrees(np.column_stack([values[:, 7], values[:, 8], values[:, 9] - wander]))
     euler[:, 2] = (euler[:, 2] + 180.0) % 360.0 - 180.0
     clock = GPS if time.max() <= WEEK + 1.0 else RELATIVE

@@ -14,23 +14,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.columns import parse_axes
 from strapdown.tables import SAMPLINGS
 
 Array = NDArray[np.float64]
-
-__all__ = [
-    "NoStreamError",
-    "Origin",
-    "RawLog",
-    "ReadOptions",
-    "Reading",
-    "Recording",
-    "StatedStart",
-    "TruthInSensorAxes",
-]
-
 
 #: Codes that say that a recording does not have a stream, which is not a fault.
 ABSENT = {
@@ -146,12 +134,8 @@ STATED, INFERRED = "stated by the user", "inferred, not yet confirmed"
 class TruthInSensorAxes:
     """Attitude truth of a log, in sensor axes.
 
-    Attributes
-    ----------
-    q_ns : ndarray, (n, 4)
-        Sensor axes to local level north-east-down at each sample, NaN where unknown.
-    scored : ndarray of bool, (n,)
-        Samples that count for errors.
+    `q_ns` ((n, 4)): sensor axes to local level north-east-down at each sample, NaN where unknown.
+    `scored` ((n,)): samples that count for errors.
     """
 
     q_ns: Array
@@ -162,14 +146,9 @@ class TruthInSensorAxes:
 class StatedStart:
     """Initial state stated in a log; shown to people, not used by any reader.
 
-    Attributes
-    ----------
-    lat_deg, lon_deg : float, deg
-        Geodetic, north and east positive.
-    alt : float, m
-    roll_pitch_heading_deg : tuple of float, deg
-        Body forward-right-down to north-east-down.
-    velocity_ned : tuple of float, m/s
+    `lat_deg`, `lon_deg` (deg): geodetic, north and east positive. `alt` (m).
+    `roll_pitch_heading_deg` (deg): body forward-right-down to north-east-down. `velocity_ned`
+    (m/s).
     """
 
     lat_deg: float
@@ -181,70 +160,47 @@ class StatedStart:
 
 @dataclass
 class RawLog:
-    """Raw columns of a file.
+    """Raw columns of a file."""
 
-    Attributes
-    ----------
-    name : str
-        Of the file or folder, for messages.
-    files : tuple of Path
-        Every file that was read.
-    columns : dict of str to ndarray
-        One-dimensional; not numeric where the file holds text.
-    rows : ndarray of int, or None
-        Row of each sample in the file, counted from 1; None if sample k is in row k + 1.
-    stated : dict of str to (str, str or None)
-        For a known recording: column to (quantity, unit); unit None if not stated.
-    other_units : list of dict of str to (str, str or None)
-        The same for each further sensor unit in the file, which is read where one of its columns
-        is asked for.
-    units : dict of str to str
-        Column to unit, if stated apart from the name.
-    triad_units : dict of str to str
-        Unit of ``gyro``, ``accel``, ``mag``, if stated of the sensor and not of a column: as
-        ``deg/s``, or of raw counts as ``deg/s/131``.
-    rate : float or None
-        Sampling rate in Hz, if stated apart from stamps.
-    sampling, axes : str or None
-        If the file states them.
-    truth : TruthInSensorAxes or None
-    findings : list of Finding
-    start : StatedStart or None
-        If the file states one.
-    above : list of str
-        Lines above a text table.
-    clock : str or None
-        Clock of its stamps (`clocks`), if the format defines it.
-    epoch : float, s
-        Seconds on that clock at stamp zero.
-    checked : bool
-        Whether `strapdown doctor` wrote it: its statements were checked against the numbers, or
-        were decided by a person.
-    calibrated : str or None
-        The calibration whose errors were taken off before it was written: name and SHA-256.
-    sparse : frozenset of str
-        Triads of which some samples may be missing, NaN: of a magnetometer that began later.
-    """
-
+    #: Of the file or folder, for messages.
     name: str
+    #: Every file that was read.
     files: tuple[Path, ...]
+    #: One-dimensional; not numeric where the file holds text.
     columns: dict[str, NDArray[Any]]
+    #: Row of each sample in the file, counted from 1; None if sample k is in row k + 1.
     rows: NDArray[np.int64] | None = None
+    #: For a known recording: column to (quantity, unit); unit None if not stated.
     stated: Mapping[str, tuple[str, str | None]] = field(default_factory=dict)
+    #: The same for each further sensor unit in the file, which is read where one of its columns is
+    #: asked for.
     other_units: list[dict[str, tuple[str, str | None]]] = field(default_factory=list)
+    #: Column to unit, if stated apart from the name.
     units: dict[str, str] = field(default_factory=dict)
+    #: Unit of ``gyro``, ``accel``, ``mag``, if stated of the sensor and not of a column: as
+    #: ``deg/s``, or of raw counts as ``deg/s/131``.
     triad_units: dict[str, str] = field(default_factory=dict)
+    #: Sampling rate in Hz, if stated apart from stamps.
     rate: float | None = None
+    #: `sampling`, `axes`: if the file states them.
     sampling: str | None = None
     axes: str | None = None
     truth: TruthInSensorAxes | None = None
     findings: list[Finding] = field(default_factory=list)
+    #: If the file states one.
     start: StatedStart | None = None
+    #: Lines above a text table.
     above: list[str] = field(default_factory=list)
+    #: Clock of its stamps (`clocks`), if the format defines it.
     clock: str | None = None
+    #: Seconds on that clock at stamp zero.
     epoch: float = 0.0
+    #: Whether `strapdown doctor` wrote it: its statements were checked against the numbers, or were
+    #: decided by a person.
     checked: bool = False
+    #: The calibration whose errors were taken off before it was written: name and SHA-256.
     calibrated: str | None = None
+    #: Triads of which some samples may be missing, NaN: of a magnetometer that began later.
     sparse: frozenset[str] = frozenset()
 
     @classmethod
@@ -265,6 +221,21 @@ class RawLog:
             **stated,
         )
 
+    def fault(
+        self, code: str, quantity: str | None = None, *, sample: int | None = None, **data: Any
+    ) -> DataError:
+        """Make an error of the file, or of one of its samples."""
+        row = None if sample is None else self.row(sample)
+        return DataError(code, file=self.name, row=row, quantity=quantity, **data)
+
+    def note(self, code: str, quantity: str | None = None, **data: Any) -> None:
+        """Add a note about the file."""
+        add_note(self.findings, code, file=self.name, quantity=quantity, **data)
+
+    def warn(self, code: str, quantity: str | None = None, **data: Any) -> None:
+        """Add a warning about the file."""
+        add_warning(self.findings, code, file=self.name, quantity=quantity, **data)
+
     def row(self, sample: int) -> int:
         """Row of a sample in the file, counted from 1."""
         return sample + 1 if self.rows is None else int(self.rows[sample])
@@ -272,13 +243,7 @@ class RawLog:
 
 @dataclass(frozen=True)
 class Origin:
-    """The raw stamp at time zero; zero itself if time was not shifted.
-
-    Attributes
-    ----------
-    stamp : int or float
-    unit : str
-    """
+    """The raw stamp at time zero; zero itself if time was not shifted."""
 
     stamp: int | float
     unit: str
@@ -407,4 +372,5 @@ def stated_by(meta: Mapping[str, Any]) -> dict[str, Any]:
             stated["axes"] = "x,y,z" if parse_axes(text) == ([0, 1, 2], [1.0, 1.0, 1.0]) else text
     if checked:
         stated |= {"clock": meta.get("clock"), "epoch": float(meta.get("clock_origin_s", 0.0))}
-    return {**stated, "checked": checked, "calibrated": calibrated_in(meta.get("calibration"))}
+    by = calibrated_in(meta["calibration"]) if "calibration" in meta else None
+    return {**stated, "checked": checked, "calibrated": by}

@@ -18,8 +18,6 @@ from strapdown.formats import csv, read_raw
 from strapdown.formats.assemble import truth_of_file
 from strapdown.formats.recording import Origin, ReadOptions
 
-__all__ = ["read_reference_words", "read_truth"]
-
 # Distinguishes a sentence from the header of a table with a column named roll.
 SENTENCE = re.compile(
     r"same[ -](?:place[ -])?as|\smoved\s|turns?\s+about|^\S+\s*:?\s+roll[ =]+[-+\d.]", re.I

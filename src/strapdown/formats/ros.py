@@ -25,15 +25,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding, check_choice
+from strapdown.errors import DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.known_formats import Quantities, solution
-from strapdown.formats.recording import (
-    NoStreamError,
-    RawLog,
-    calibrated_in,
-    calibrated_mark,
-)
+from strapdown.formats.recording import NoStreamError, RawLog, calibrated_in, calibrated_mark
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.formats.writing import (
     FLU,
@@ -66,21 +61,11 @@ MODERN = 10**18  # ns, 2001: a clock since the start of a device never counts so
 Columns = dict[str, NDArray[Any]]
 
 
-def _has_messages(path: Path) -> bool:
-    """Whether a bag has the tables of ROS 2; only a ``.db3`` can lack them."""
-    if _suffix(path) != ".db3":
-        return True
-    return bool(parse("bags.has_messages", path))
-
-
-def _is_described(folder: Path) -> bool:
-    return b"rosbag2_bagfile_information" in first_bytes(folder / "metadata.yaml", 4096)
-
-
 detect = Signs(
     first=rb"\A(?:" + b"|".join(map(re.escape, MAGIC)) + rb")",
-    also=_has_messages,
-    folder=_is_described,
+    # Of a bag of ROS 2 only a ``.db3`` can lack its tables.
+    also=lambda path: _suffix(path) != ".db3" or bool(parse("bags.has_messages", path)),
+    folder=lambda path: b"rosbag2_bagfile_information" in first_bytes(path / "metadata.yaml", 4096),
 )
 
 
@@ -118,7 +103,7 @@ def _read(
     columns = dict(_parsed("bags.columns", path, topic=topic, kinds=list(kinds), values=values))
     record_time = columns.pop("record")
     if not columns["time"].any():
-        findings.append(Finding("io.ros-stamps-of-record", file=path.name, quantity="time"))
+        add_warning(findings, "io.ros-stamps-of-record", file=path.name, quantity="time")
         columns["time"] = record_time
     clock = UNIX if columns["time"].max(initial=0) > MODERN else RELATIVE
     return columns, findings, clock
@@ -157,7 +142,7 @@ def _topic(
         )
     if len(topics) > 1:
         note = {"topic": picked[0], "others": [t for t in topics if t != picked[0]]}
-        findings.append(Finding("io.ros-topic-taken", file=path.name, severity="note", data=note))
+        add_note(findings, "io.ros-topic-taken", file=path.name, data=note)
     return str(picked[0])
 
 
@@ -180,12 +165,12 @@ def read(path: Path, topic: str | None = None) -> RawLog:
         if columns[f"{triad}_none"].all() and not any(v.any() for v, _ in part.values()):
             if triad == "gyro":
                 raise DataError("io.ros-not-measured", file=path.name, quantity=triad)
-            findings.append(Finding("io.ros-not-measured", file=path.name, quantity=triad))
+            add_warning(findings, "io.ros-not-measured", file=path.name, quantity=triad)
             continue
         # Some drivers publish acceleration without gravity; nothing falls for half of a recording.
         if triad == "accel" and size < LEAST_FORCE:
-            findings.append(
-                Finding("io.force-without-gravity", file=path.name, quantity=triad, size=size)
+            add_warning(
+                findings, "io.force-without-gravity", file=path.name, quantity=triad, size=size
             )
             continue
         out |= part
@@ -225,13 +210,13 @@ def _velocity(path: Path, fixes: Columns, findings: list[Finding]) -> dict[str, 
         ned[at], sd[at] = columns["ned"][of], columns["variance"][of]
         sd = np.sqrt(np.where(sd > 0.0, sd, np.nan))
         note = {"topic": topic, "count": same.size}
-        findings.append(Finding("io.ros-velocity", file=path.name, severity="note", data=note))
+        add_note(findings, "io.ros-velocity", file=path.name, data=note)
         out = {f"V{a}": (ned[:, k], "m/s") for k, a in enumerate("NED")}
         stated = np.isfinite(sd).any()
         return out | {f"V{a}_sd": (sd[:, k], "m/s") for k, a in enumerate("NED") if stated}
     if topics:
         left = {"topics": sorted(topics)}
-        findings.append(Finding("io.ros-twist-left", file=path.name, severity="note", data=left))
+        add_note(findings, "io.ros-twist-left", file=path.name, data=left)
     return {}
 
 

@@ -12,34 +12,24 @@ import codecs
 import dataclasses
 import re
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path, PurePosixPath
-from typing import Any
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, add_note
 from strapdown.formats import csv
 from strapdown.formats.columns import read_name
 from strapdown.formats.find_columns import AXES, find_columns
 from strapdown.formats.inference.conclusion import EPOCH
 from strapdown.formats.join import join
 from strapdown.formats.recording import RawLog, ReadOptions
-from strapdown.formats.signs import Signs, state_of
+from strapdown.formats.signs import Signs, while_unchanged
 from strapdown.formats.vocabularies import WITHOUT_GRAVITY
 from strapdown.parsers import parse
 from strapdown.units import TIME_UNITS
-
-__all__ = ["Member", "is_container", "members_of", "peek"]
-
 
 _TRIADS = {"gyro": "gyro", "accel": "accel", "mag": "mag", "magnetometer": "mag"}
 #: Words of a table that has no gravity, or that its device did not correct.
 _NOT_A_TRIAD = {*WITHOUT_GRAVITY, "gravity", "uncalibrated"}
 _AXIS = re.compile(r"([xyz])(?:[\s_-]*axis)?(?:\s*[\[(].*)?", re.I)
-
-
-def _has_gyro(folder: Path) -> bool:
-    """Whether a folder has a table named after a gyro."""
-    return any(_triad(m) == "gyro" for m in peek(folder))
 
 
 def _is_of_one_recording(archive: Path) -> bool:
@@ -51,21 +41,17 @@ def _is_of_one_recording(archive: Path) -> bool:
 
 
 #: Any archive of that size is accepted.
-detect = Signs(suffixes=(".zip",), also=_is_of_one_recording, folder=_has_gyro)
+detect = Signs(
+    suffixes=(".zip",),
+    also=_is_of_one_recording,
+    folder=lambda path: any(_triad(m) == "gyro" for m in peek(path)),
+)
 
 
 def read(path: Path) -> RawLog:
     """Read each sensor's table, joined on the stamps of the gyro.
 
-    Returns
-    -------
-    RawLog
-        Columns named x, y, z belong to the sensor after which their table is named.
-
-    Raises
-    ------
-    DataError
-        The archive or a table is damaged, or the gyro is missing.
+    Columns named x, y, z belong to the sensor after which their table is named.
     """
     name = path.resolve().name
     members = members_of(path)
@@ -77,7 +63,7 @@ def read(path: Path) -> RawLog:
         )
     raw = join([_log(m) for m in tables], name, rows_of_member=True)
     if others := [m.name for m in members if m.suffix in csv.SUFFIXES and m not in tables]:
-        raw.findings.append(Finding("io.tables-not-used", file=name, severity="note", names=others))
+        add_note(raw.findings, "io.tables-not-used", file=name, names=others)
     return raw
 
 
@@ -140,15 +126,8 @@ MOST_TABLES = 200
 class Member:
     """A file of a folder, or a member of an archive.
 
-    Attributes
-    ----------
-    name : str
-        Path inside the folder or archive, with slashes.
-    label : str
-        Given path and name, for messages.
-    file : Path
-        The file on disk that holds it.
-    archived : bool
+    `name`: path inside the folder or archive, with slashes. `label`: given path and name, for
+    messages. `file`: the file on disk that holds it.
     """
 
     name: str
@@ -169,10 +148,7 @@ class Member:
     def read(self) -> bytes:
         """Read the whole content.
 
-        Raises
-        ------
-        DataError
-            The file cannot be read, or declares more data than is stored.
+        DataError: the file cannot be read, or declares more data than is stored.
         """
         return self._bytes(-1)
 
@@ -186,7 +162,7 @@ class Member:
     def _bytes(self, count: int) -> bytes:
         if self.archived:
             if count == HEAD and self.suffix in csv.SUFFIXES:
-                data = _heads(self.file, state_of(self.file)).get(self.name)
+                data = _heads(self.file).get(self.name)
                 if data is not None:
                     return data
             data = parse(
@@ -200,8 +176,8 @@ class Member:
             raise DataError("io.member-unreadable", file=self.label, error=error) from None
 
 
-@lru_cache(maxsize=2)
-def _heads(archive: Path, _state: tuple[Any, ...]) -> dict[str, bytes | None]:
+@while_unchanged(2)
+def _heads(archive: Path) -> dict[str, bytes | None]:
     """Return the beginning of each table: detection asks for those of all, once a format."""
     tables = [m.name for m in _listed(archive) if m.suffix in csv.SUFFIXES][:MOST_TABLES]
     heads = parse("archives.heads", archive, members=tables, count=HEAD)
@@ -243,13 +219,13 @@ def _listed(path: Path) -> list[Member]:
         ]
     return [
         Member(n, f"{whole}/{n}", path, True)
-        for n in _names(path, state_of(path))
+        for n in _names(path)
         if not any(part.startswith((".", "__MACOSX")) for part in PurePosixPath(n).parts)
     ]
 
 
-@lru_cache(maxsize=2)
-def _names(path: Path, _state: tuple[Any, ...]) -> tuple[str, ...]:
+@while_unchanged(2)
+def _names(path: Path) -> tuple[str, ...]:
     return tuple(parse("archives.names", path, label=path.resolve().name))
 
 

@@ -22,13 +22,14 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv
 from strapdown.formats.clocks import UNIX
 from strapdown.formats.join import join
@@ -80,8 +81,10 @@ def _has_sensor(path: Path) -> bool:
         text = head(path, 4096)
         return text.lstrip().startswith("[") and '"sensor"' in text
     members = peek(path) if is_container(path) else [file_member(path)]
-    return any(_sensor(m) in SENSORS and _has_header(m) for m in members) or any(
-        _is_located(m) for m in members
+    return any(
+        (_sensor(m) in SENSORS and _has_columns(m, "x", "y", "z"))
+        or (_sensor(m) in STREAMS["gnss"][0] and _has_columns(m, "latitude", "longitude"))
+        for m in members
     )
 
 
@@ -95,13 +98,7 @@ detect = Signs(
 
 
 def read(path: Path) -> RawLog:
-    """Read gyro, specific force and magnetic field, joined on the stamps of the gyro.
-
-    Raises
-    ------
-    DataError
-        A file is damaged, or the gyroscope is missing.
-    """
+    """Read gyro, specific force and magnetic field, joined on the stamps of the gyro."""
     name = path.resolve().name
     sensors, meta, files, _ = _tables(path, SENSORS)
     if not sensors and path.is_file() and detect(path):
@@ -123,11 +120,6 @@ def read(path: Path) -> RawLog:
     return raw
 
 
-def read_fixes(path: Path) -> RawLog:
-    """Read the fixes of ``Location``."""
-    return _read_stream(path, "gnss")
-
-
 def read_magnetometer(path: Path) -> RawLog:
     """Read the magnetic field at its own stamps, about the axes of the phone."""
     raw = _read_stream(path, "magnetometer")
@@ -135,43 +127,32 @@ def read_magnetometer(path: Path) -> RawLog:
     return raw
 
 
-def read_barometer(path: Path) -> RawLog:
-    """Read the pressure."""
-    return _read_stream(path, "barometer")
-
-
 def _read_stream(path: Path, stream: str) -> RawLog:
     kinds, wanted = STREAMS[stream]
     tables, _, _, held = _tables(path, kinds)
     for kind in kinds:
         if kind in tables:
-            return _stated(tables[kind], wanted)
+            raw = tables[kind]
+            stated: dict[str, tuple[str, str | None]] = {"time": ("time", "ns")}
+            stated |= {c: (q, u) for q, (c, u) in wanted.items() if c in raw.columns}
+            raw.stated, raw.clock = stated, UNIX
+            return raw
     there = [s for s, (k, _) in STREAMS.items() if set(k) & held]
     there += ["imu"] * bool(set(GYROS) & held)
     raise lacking(path, stream, TITLE, there)
 
 
-def _stated(raw: RawLog, wanted: dict[str, tuple[str, str]]) -> RawLog:
-    stated: dict[str, tuple[str, str | None]] = {"time": ("time", "ns")}
-    stated |= {c: (q, u) for q, (c, u) in wanted.items() if c in raw.columns}
-    raw.stated, raw.clock = stated, UNIX
-    return raw
-
-
-def _is_located(member: Member) -> bool:
-    if _sensor(member) not in STREAMS["gnss"][0]:
-        return False
-    fields = {f.strip().strip('"').lower() for f in first_line(member).split(",")}
-    return {"time", "seconds_elapsed", "latitude", "longitude"} <= fields
+read_fixes = partial(_read_stream, stream="gnss")
+read_barometer = partial(_read_stream, stream="barometer")
 
 
 def _sensor(member: Member) -> str:
     return _COPY.sub("", member.stem) if member.suffix == ".csv" else ""
 
 
-def _has_header(member: Member) -> bool:
+def _has_columns(member: Member, *names: str) -> bool:
     fields = {f.strip().strip('"').lower() for f in first_line(member).split(",")}
-    return {"time", "seconds_elapsed", "x", "y", "z"} <= fields
+    return {"time", "seconds_elapsed", *names} <= fields
 
 
 def _tables(
@@ -289,13 +270,8 @@ def _log(sensor: RawLog, triad: str, unit: str | None) -> RawLog:
 def _gyro(sensors: dict[str, RawLog], findings: list[Finding]) -> RawLog:
     kind = next(k for k in GYROS if k in sensors)
     if kind == GYROS[1]:
-        findings.append(
-            Finding(
-                "io.uncalibrated-gyroscope-read",
-                file=sensors[kind].name,
-                quantity="gyro",
-                severity="note",
-            )
+        add_note(
+            findings, "io.uncalibrated-gyroscope-read", file=sensors[kind].name, quantity="gyro"
         )
     return _log(sensors[kind], "gyro", "rad/s")
 
@@ -322,21 +298,17 @@ def _force(
         logs = [_log(sensors[raw], "accel", "-g" if turned else unit)]
     else:
         if linear in sensors:
-            findings.append(
-                Finding(
-                    "io.left-out-without-gravity-no", file=sensors[linear].name, quantity="accel"
-                )
+            add_warning(
+                findings,
+                "io.left-out-without-gravity-no",
+                file=sensors[linear].name,
+                quantity="accel",
             )
         return []
     if not known:
-        findings.append(Finding("io.sensor-logger-platform-unknown", file=name, quantity="accel"))
+        add_warning(findings, "io.sensor-logger-platform-unknown", file=name, quantity="accel")
     elif turned:
-        findings.append(
-            Finding(
-                "io.written-ios-without-standardised-frames",
-                file=name,
-                quantity="accel",
-                severity="note",
-            )
+        add_note(
+            findings, "io.written-ios-without-standardised-frames", file=name, quantity="accel"
         )
     return logs

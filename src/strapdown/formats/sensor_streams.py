@@ -17,22 +17,6 @@ from typing import NamedTuple
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.stamp_gate import StampGate
 
-__all__ = [
-    "ACCEL",
-    "FIX",
-    "GRAVITY",
-    "GYRO",
-    "LINEAR",
-    "MAG",
-    "PRESSURE",
-    "WIDTHS",
-    "Event",
-    "Joined",
-    "Located",
-    "SensorStreams",
-    "is_event",
-]
-
 #: Kinds of events, and their numbers of values: rad/s; m/s² with gravity, without it, and gravity
 #: alone, of the sign of specific force; µT; latitude and longitude (deg), height over the ellipsoid
 #: (m), speed and its standard deviation (m/s), course (deg), horizontal and vertical accuracy (m),
@@ -60,13 +44,8 @@ MOST = 1e9
 class Event(NamedTuple):
     """One sample of one sensor.
 
-    Attributes
-    ----------
-    kind : int
-    stamp : int, ns
-        By the clock of the device.
-    values : tuple of float
-        As many as `WIDTHS` says, axes of the device.
+    `stamp` (ns): by the clock of the device. `values`: as many as `WIDTHS` says, axes of the
+    device.
     """
 
     kind: int
@@ -77,14 +56,8 @@ class Event(NamedTuple):
 class Joined(NamedTuple):
     """Sample of all inertial sensors at a stamp of the gyro.
 
-    Attributes
-    ----------
-    time : float, s
-        From `SensorStreams.epoch`.
-    gyro, accel : tuple of float
-        rad/s and m/s², axes of the device.
-    mag : tuple of float, or None
-        µT; None where there is none.
+    `time` (s): from `SensorStreams.epoch`. `gyro`, `accel`: rad/s and m/s², axes of the device.
+    `mag`: µT; None where there is none.
     """
 
     time: float
@@ -143,19 +116,10 @@ class _Track:
 class SensorStreams:
     """Join the sensors of one device as their samples arrive.
 
-    Parameters
-    ----------
-    hold : float, s
-        By how much samples of a sensor may be late; each waits so long, by the stamps.
-
-    Attributes
-    ----------
-    epoch : int or None, s
-        Origin of `Joined.time`, on the clock of the device; None before the first sample.
-    unused : Counter
-        Events that were not used, by reason.
-    went_back : bool
-        Whether the clock of the device was set back: what follows belongs to another session.
+    `hold` (s): by how much samples of a sensor may be late; each waits so long, by the stamps.
+    `epoch` (s): origin of `Joined.time`, on the clock of the device; None before the first sample.
+    `unused`: events that were not used, by reason. `went_back`: whether the clock of the device was
+    set back: what follows belongs to another session.
     """
 
     def __init__(self, hold: float = 0.0) -> None:

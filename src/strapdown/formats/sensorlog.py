@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import RELATIVE, UNIX
@@ -83,16 +83,8 @@ detect = Signs(text=r"\A\s*+.*\(rad/s\)", also=_has_gyro)
 def read(path: Path) -> RawLog:
     """Read rates and specific force, joined on the stamps of the gyro.
 
-    Returns
-    -------
-    RawLog
-        Rates of the fused motion, which the phone has corrected for its bias, or else of the
-        gyro; specific force from user acceleration and gravity, or else the accelerometer.
-
-    Raises
-    ------
-    DataError
-        The file is damaged, or its sensors have no stamps.
+    Rates of the fused motion, which the phone has corrected for its bias, or else of the gyro;
+    specific force from user acceleration and gravity, or else the accelerometer.
     """
     raw = csv.parse(path.read_bytes(), path.name, (path,))
     have = set(raw.columns)
@@ -110,9 +102,7 @@ def read(path: Path) -> RawLog:
     if field is not None and np.any([column(raw, name) for name in _three(*field)]):
         logs.append(_log(raw, field[0], "mag", "uT", findings, field[1]))
     if turned:
-        findings.append(
-            Finding("io.sign-of-ios-turned", file=path.name, quantity="accel", severity="note")
-        )
+        add_note(findings, "io.sign-of-ios-turned", file=path.name, quantity="accel")
     out = join(logs, path.name, (path,))
     return dataclasses.replace(out, findings=[*raw.findings, *findings, *out.findings])
 
@@ -133,9 +123,7 @@ def read_fixes(path: Path) -> RawLog:
         # The time of day may be that of the place.
         ahead += ZONE * round(float(np.nanmedian((time - wall)[own])) / ZONE) if own.any() else 0.0
         time, clock = time - ahead, RELATIVE
-        raw.findings.append(
-            Finding("io.fixes-since-start", file=path.name, quantity="time", severity="note")
-        )
+        add_note(raw.findings, "io.fixes-since-start", file=path.name, quantity="time")
     return selected(stated_by(raw, {"time": (time, "s"), **held}, clock=clock), own)
 
 
@@ -154,16 +142,14 @@ def _log(
         stamps, _ = ticks_of(raw, time)
     own = _changes(stamps) if time != WALL_CLOCK else np.ones(stamps.size, dtype=bool)
     if (repeated := int((~own).sum())) and triad == "gyro":
-        findings.append(
-            Finding(
-                "io.rows-repeat-sample-before-stamp",
-                file=raw.name,
-                row=raw.row(int(np.argmin(own))),
-                quantity=triad,
-                severity="note",
-                repeated=repeated,
-                size=own.size,
-            )
+        add_note(
+            findings,
+            "io.rows-repeat-sample-before-stamp",
+            file=raw.name,
+            row=raw.row(int(np.argmin(own))),
+            quantity=triad,
+            repeated=repeated,
+            size=own.size,
         )
     rows = np.arange(1, stamps.size + 1) if raw.rows is None else raw.rows
     return sensor_log(
@@ -183,13 +169,7 @@ def _clock(raw: RawLog, kind: str) -> str:
     for name in (STAMPS[kind], STAMPS[MOTION], STAMPS[GYRO], WALL_CLOCK):
         if name in raw.columns:
             return name
-    raise DataError(
-        "io.no-column-5",
-        file=raw.name,
-        quantity="time",
-        stamps=STAMPS[kind],
-        columns=list(raw.columns),
-    )
+    raise raw.fault("io.no-column-5", "time", stamps=STAMPS[kind], columns=list(raw.columns))
 
 
 def _changes(stamps: NDArray[Any]) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, add_note
 from strapdown.formats.csv import SUFFIXES, decoded
 from strapdown.formats.join import join
 from strapdown.formats.known_formats import force_of, sensor_log
@@ -59,16 +59,8 @@ detect = Signs(
 def read(path: Path) -> RawLog:
     """Read the blocks of each sensor, joined on the stamps of the gyro.
 
-    Returns
-    -------
-    RawLog
-        Lines without a gyro are not samples; accelerometer or magnetic field from other lines
-        are interpolated to the stamps of the gyro.
-
-    Raises
-    ------
-    DataError
-        A line has another format, or no line has a gyro.
+    Lines without a gyro are not samples; accelerometer or magnetic field from other lines are
+    interpolated to the stamps of the gyro.
     """
     text, findings = decoded(path.read_bytes(), path.name)
     numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
@@ -77,12 +69,13 @@ def read(path: Path) -> RawLog:
         parsed = blocks_of(line)
         if parsed is None:
             if k == len(numbered) - 1 and k and not text.endswith(("\n", "\r")):
-                findings.append(
-                    Finding("io.last-line-cut-left-out-2", file=path.name, row=row, severity="note")
-                )
+                add_note(findings, "io.last-line-cut-left-out-2", file=path.name, row=row)
                 break
             raise DataError(
-                "io.not-stamp-blocks-id-values", file=path.name, row=row, value_shown=_shown(line)
+                "io.not-stamp-blocks-id-values",
+                file=path.name,
+                row=row,
+                value_shown=line if len(line) <= 60 else f"{line[:60]}…",
             )
         for kind, values in parsed[1].items():
             seen.setdefault(kind, []).append((row, parsed[0], values))
@@ -91,15 +84,13 @@ def read(path: Path) -> RawLog:
             "io.no-line-gyroscope-id-ids", file=path.name, quantity="gyro", seen=sorted(seen)
         )
     if without := len(numbered) - len(seen[4]):
-        findings.append(
-            Finding(
-                "io.lines-no-gyroscope-no-samples",
-                file=path.name,
-                quantity="gyro",
-                severity="note",
-                without=without,
-                count=len(numbered),
-            )
+        add_note(
+            findings,
+            "io.lines-no-gyroscope-no-samples",
+            file=path.name,
+            quantity="gyro",
+            without=without,
+            count=len(numbered),
         )
     logs = [_log(path, seen, kind, *TRIADS[kind]) for kind in (4, 3, 5) if kind in seen]
     if 3 not in seen and {82, 83} <= set(seen):
@@ -151,7 +142,3 @@ def blocks_of(line: str) -> tuple[float, Blocks] | None:
     except (ValueError, IndexError):
         return None
     return stamp, blocks
-
-
-def _shown(line: str) -> str:
-    return line if len(line) <= 60 else f"{line[:60]}…"

@@ -11,48 +11,35 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from functools import lru_cache
+from functools import lru_cache, wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-__all__ = ["HEAD", "Signs", "first_bytes", "head", "state_of"]
-
+T = TypeVar("T")
 #: Bytes of a file that are looked at.
 HEAD = 1 << 16
 
 
 @dataclass(frozen=True)
 class Signs:
-    """Detection of a format.
+    """Detection of a format."""
 
-    Attributes
-    ----------
-    named : tuple of str
-        Endings of a file that are enough, in lower case.
-    suffixes : tuple of str
-        Endings that a file may have otherwise; any if empty.
-    first : bytes
-        Regular expression that is found in the first `HEAD` bytes; a dot stands for any byte.
-    text : str
-        Regular expression that is found in the text of these bytes; ``^`` and ``$`` are ends of a
-        line. The text of binary content ends at its first zero byte.
-    also : callable, optional
-        Sign that these cannot express; called if all others are there.
-    inside : str
-        Pattern of names (`fnmatch`, in lower case), of which a folder holds at least one.
-    folder : callable, optional
-        Sign of a folder. Without either no folder is of this format.
-    zipped : bool
-        Whether an archive (``.zip``) is looked at like a folder.
-    """
-
+    #: Endings of a file that are enough, in lower case.
     named: tuple[str, ...] = ()
+    #: Endings that a file may have otherwise; any if empty.
     suffixes: tuple[str, ...] = ()
+    #: Regular expression that is found in the first `HEAD` bytes; a dot stands for any byte.
     first: bytes = b""
+    #: Regular expression that is found in the text of these bytes; ``^`` and ``$`` are ends of a
+    #: line. The text of binary content ends at its first zero byte.
     text: str = ""
+    #: Sign that these cannot express; called if all others are there.
     also: Callable[[Path], bool] | None = None
+    #: Pattern of names (`fnmatch`, in lower case), of which a folder holds at least one.
     inside: str = ""
+    #: Sign of a folder. Without either no folder is of this format.
     folder: Callable[[Path], bool] | None = None
+    #: Whether an archive (``.zip``) is looked at like a folder.
     zipped: bool = False
 
     def __call__(self, path: Path, data: bytes | None = None) -> bool:
@@ -105,6 +92,18 @@ def state_of(path: Path) -> tuple[Any, ...]:
         return tuple((str(p), (at := p.stat()).st_size, at.st_mtime_ns) for p in inside)
     except OSError:
         return ()
+
+
+def while_unchanged(most: int) -> Callable[[Callable[[Path], T]], Callable[[Path], T]]:
+    """Keep the newest results of a function of a path until its file or folder changes."""
+
+    def decorated(read: Callable[[Path], T]) -> Callable[[Path], T]:
+        kept = lru_cache(maxsize=most)(lambda path, _state: read(path))
+        found = wraps(read)(lambda path: kept(path, state_of(path)))
+        vars(found)["cache_clear"] = kept.cache_clear
+        return found
+
+    return decorated
 
 
 def head(path: Path, count: int = 1 << 14) -> str:

@@ -14,8 +14,6 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-__all__ = ["StampGate"]
-
 T = TypeVar("T")
 
 #: A longer step is not a step of a sensor: held samples further apart do not confirm each other, s.
@@ -41,19 +39,10 @@ class _Held(Generic[T]):
 class StampGate(Generic[T]):
     """Hold samples after a gap until others confirm it.
 
-    Parameters
-    ----------
-    confirm : int
-        Samples in a row that confirm a new time, and the begin of a run.
-    gap : float
-        A step of more than this multiple of the usual one is a gap.
-
-    Attributes
-    ----------
-    newest : float, s
-        Stamp of the newest sample that passed; -inf before the first.
-    dropped : list
-        Stamps and items that were contradicted by the last call.
+    `confirm`: samples in a row that confirm a new time, and the begin of a run. `gap`: a step of
+    more than this multiple of the usual one is a gap. `newest` (s): stamp of the newest sample that
+    passed; -inf before the first. `dropped`: stamps and items that were contradicted by the last
+    call.
     """
 
     def __init__(self, confirm: int, gap: float) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.android_events import joined, kind_of
 from strapdown.formats.arrays import raw_log
@@ -36,14 +36,8 @@ from strapdown.tables.on_disk import room
 detect_excel = Signs(suffixes=(".xlsx", ".xlsm"), first=rb"\APK\x03\x04")
 
 
-def read_excel(path: Path) -> RawLog:
-    """Read the sheet with the most numbers.
-
-    Raises
-    ------
-    DataError
-        The library is missing, the file is damaged, or no sheet has numbers.
-    """
+def read_excel_table(path: Path) -> RawLog:
+    """Read the sheet with the most numbers."""
     sheets = parse("workbooks.sheets", path)
     counts = {
         name: sum(isinstance(c, int | float) for row in rows for c in row)
@@ -60,9 +54,7 @@ def read_excel(path: Path) -> RawLog:
     raw = with_force_summed(csv.parse(buffer.getvalue().encode(), path.name, (path,)))
     if len(sheets) > 1:
         others = [n for n in sheets if n != name]
-        raw.findings.append(
-            Finding("io.sheet-read", file=path.name, severity="note", name=name, others=others)
-        )
+        add_note(raw.findings, "io.sheet-read", file=path.name, name=name, others=others)
     return raw
 
 
@@ -118,14 +110,8 @@ def _begins(path: Path) -> bool:
 detect_json = Signs(suffixes=(*JSON_SUFFIXES, ".txt", ".log"), text=r"\A\s*+[\[{]", also=_begins)
 
 
-def read_json(path: Path) -> RawLog:
-    """Read the members of the objects as columns, missing ones as NaN.
-
-    Raises
-    ------
-    DataError
-        A line is not JSON, a value is neither a number nor a text, or the file has no object.
-    """
+def read_json_table(path: Path) -> RawLog:
+    """Read the members of the objects as columns, missing ones as NaN."""
     if _APART.search(head(path)):
         return _names_apart(path)
     objects, rows, findings = _objects(path)
@@ -196,9 +182,7 @@ def _objects(path: Path) -> tuple[list[dict[str, Any]], list[int], list[Finding]
             one = json.loads(line)
         except (ValueError, RecursionError) as error:
             if row == len(lines) and objects and not text.endswith("\n"):
-                findings.append(
-                    Finding("io.last-line-cut-left-out", file=path.name, row=row, severity="note")
-                )
+                add_note(findings, "io.last-line-cut-left-out", file=path.name, row=row)
                 continue
             raise DataError("io.no-json", file=path.name, row=row, msg=str(error)) from None
         if not isinstance(one, dict):
@@ -263,14 +247,8 @@ LABVIEW_MAGIC, END = "LabVIEW Measurement", "***End_of_Header***"
 detect_labview = Signs(text=rf"\A{LABVIEW_MAGIC}")
 
 
-def read_labview(path: Path) -> RawLog:
-    """Read the channels, with the units that the header states.
-
-    Raises
-    ------
-    DataError
-        The header does not end, or a second one follows the rows.
-    """
+def read_labview_table(path: Path) -> RawLog:
+    """Read the channels, with the units that the header states."""
     text, _ = csv.decoded(path.read_bytes(), path.name)
     lines = text.split("\n")
     ends = [k for k, line in enumerate(lines) if line.startswith(END)]
@@ -300,14 +278,8 @@ def read_labview(path: Path) -> RawLog:
 detect_numpy = Signs(named=(".npz",))
 
 
-def read_numpy(path: Path) -> RawLog:
-    """Read the arrays of a NumPy archive; its content is never executed.
-
-    Raises
-    ------
-    DataError
-        The file is not an archive, is damaged, declares too much data, or holds Python objects.
-    """
+def read_numpy_table(path: Path) -> RawLog:
+    """Read the arrays of a NumPy archive; its content is never executed."""
     found = arrays_of(path)
     arrays = {name: array for name, array in found.items() if array.ndim}
     meta = {name: array for name, array in found.items() if not array.ndim}
@@ -350,20 +322,17 @@ def load_numpy(path: Path, label: str) -> NDArray[Any]:
 # Folders of NumPy arrays, one per quantity: ``time.npy``, ``gyro_rad_s.npy``, ``accel.npy``.
 
 
-def _has_gyro(folder: Path) -> bool:
-    """Whether a folder has an array with the name of a gyro."""
-    return any(str(read_name(p.stem).quantity).startswith("gyro") for p in _arrays(folder))
+detect_numpy_folder = Signs(
+    folder=lambda path: any(
+        str(read_name(p.stem).quantity).startswith("gyro") for p in _arrays(path)
+    )
+)
 
 
-detect_numpy_folder = Signs(folder=_has_gyro)
-
-
-def read_numpy_folder(path: Path) -> RawLog:
+def read_numpy_folder_table(path: Path) -> RawLog:
     """Read every array of the folder, each under its file name.
 
-    Returns arrays that differ in length from the gyro's are dropped and listed. DataError: an array
-    is damaged, declares more data than it holds, or holds Python objects; or the stamps differ in
-    length from the gyro.
+    Returns arrays that differ in length from the gyro's are dropped and listed.
     """
     name = path.resolve().name
     arrays: dict[str, NDArray[Any]] = {}
@@ -393,17 +362,9 @@ detect_parquet = Signs(named=PARQUET_SUFFIXES, first=rb"\A" + re.escape(PARQUET_
 def read_parquet(path: Path) -> RawLog:
     """Read the numeric columns of a table.
 
-    Returns
-    -------
-    RawLog
-        Columns of structures are named ``structure.field``, those of lists of equal length
-        ``list[0]``, ``list[1]`` …; missing values are NaN. The metadata ``unit`` or ``units``
-        of a field, and ``sampling``, ``axes`` and a rate of the table, are understood.
-
-    Raises
-    ------
-    DataError
-        The file is damaged, or declares far more data than it holds.
+    Columns of structures are named ``structure.field``, those of lists of equal length ``list[0]``,
+    ``list[1]`` …; missing values are NaN. The metadata ``unit`` or ``units`` of a field, and
+    ``sampling``, ``axes`` and a rate of the table, are understood.
     """
     found = parse("parquet.table", path, room=room)
     return with_force_summed(raw_log(path, found["arrays"], found["units"], found["meta"]))
@@ -507,11 +468,7 @@ def _wkb(points: NDArray[np.float64]) -> Any:
 
 
 def _geo(points: NDArray[np.float64]) -> dict[str, Any]:
-    column: dict[str, Any] = {
-        "encoding": "WKB",
-        "geometry_types": ["Point Z"],
-        "crs": EPSG_4979,
-    }
+    column: dict[str, Any] = {"encoding": "WKB", "geometry_types": ["Point Z"], "crs": EPSG_4979}
     low, high = points.min(axis=0), points.max(axis=0)
     # A box across the date line has its west beyond its east (RFC 7946, 5.2): it is left out.
     if high[0] - low[0] <= 180.0:

@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 
 from strapdown.tables import on_disk
 
-__all__ = ["NULLS", "Columns", "columns_at_once", "parsed", "single_blanks"]
-
 Columns = list[NDArray[Any]]
 #: Texts of missing values.
 NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
@@ -41,22 +39,10 @@ def columns_at_once(
 ) -> Columns | None:
     """Parse columns of lines of equal width.
 
-    Parameters
-    ----------
-    source : bytes or Path
-        A text, or the file that holds it.
-    count : int
-        Number of columns.
-    separator : str or None
-        Separator of fields; None for any run of blanks.
-    start : int, bytes
-        Where the first of these lines begins.
-
-    Returns
-    -------
-    list of ndarray, (n,), or None
-        As `parsed`. None if a line has another width, is empty, or a field may be other than a
-        plain number, date or word: in quotes, hexadecimal, with a decimal comma, not ASCII.
+    `source`: a text, or the file that holds it. `count`: number of columns. `separator`: separator
+    of fields; None for any run of blanks. `start` (bytes): where the first of these lines begins.
+    Returns (n,): as `parsed`. None if a line has another width, is empty, or a field may be other
+    than a plain number, date or word: in quotes, hexadecimal, with a decimal comma, not ASCII.
     """
     import pyarrow as pa
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +11,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats import csv, hdf5, table_files
 from strapdown.formats.clocks import RELATIVE, Clock, with_clock
 from strapdown.formats.columns import read_name
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.known_formats import column, lacking, under
 from strapdown.formats.recording import NoStreamError, RawLog, StatedStart
-from strapdown.formats.signs import Signs, head, state_of
+from strapdown.formats.signs import Signs, head, while_unchanged
 from strapdown.parsers import parse
 from strapdown.rotation import dcm_from_euler
 from strapdown.tables import trajectory_table
@@ -72,13 +71,7 @@ def files_of_gnss_ins_sim(path: Path) -> tuple[Path, ...]:
 
 
 def read_gnss_ins_sim(path: Path) -> RawLog:
-    """Read rates, specific force and magnetic field of the first run.
-
-    Raises
-    ------
-    DataError
-        A table is missing or damaged, or has another number of rows than the stamps.
-    """
+    """Read rates, specific force and magnetic field of the first run."""
     path = _folder(path)
     findings: list[Finding] = []
     time = _columns(path, path / "time.csv", findings)
@@ -156,11 +149,7 @@ def _table(path: Path, kind: str) -> Path | None:
 def _first_of_gnss_ins_sim(path: Path, kind: str, findings: list[Finding]) -> Path | None:
     table, count = _table(path, kind), len(list(path.glob(f"{kind}-*.csv")))
     if table is not None and count > 1:
-        findings.append(
-            Finding(
-                "io.first-of-runs", file=table.name, quantity=kind, severity="note", count=count
-            )
-        )
+        add_note(findings, "io.first-of-runs", file=table.name, quantity=kind, count=count)
     return table
 
 
@@ -182,13 +171,7 @@ def _columns(
         held[NED.get(quantity, quantity)] = (np.asarray(column(raw, name)), unit)
     size = next(iter(held.values()))[0].size
     if count is not None and size != count:
-        raise DataError(
-            "io.rows-not-those-of-stamps",
-            file=raw.name,
-            row=raw.row(size - 1),
-            size=size,
-            count=count,
-        )
+        raise raw.fault("io.rows-not-those-of-stamps", sample=size - 1, size=size, count=count)
     return held
 
 
@@ -263,11 +246,9 @@ def _first_of_navego(path: Path, kind: str) -> tuple[dict[str, Array], int, list
     names = _kinds(structures).get(kind, [])
     if not names:
         raise lacking(path, kind, NAVEGO_TITLE, _kinds(structures))
-    findings = []
+    findings: list[Finding] = []
     if len(names) > 1:
-        findings.append(
-            Finding("io.first-of-structures", file=path.name, quantity=kind, names=names)
-        )
+        add_warning(findings, "io.first-of-structures", file=path.name, quantity=kind, names=names)
     fields = structures[names[0]]
     count = fields["t"].size
     for field in FIELDS[kind] | ({"vel"} & fields.keys()):
@@ -363,19 +344,11 @@ detect_psins = Signs(named=(SUFFIX,))
 def read_psins(path: Path) -> RawLog:
     """Read the increments of a strapdown unit.
 
-    Returns
-    -------
-    RawLog
-        Columns ``dtheta_x`` … in rad and ``dv_x`` … in m/s, with ``time`` at the end of each
-        interval. A SIMU log is converted with the scale factors and clock of its header, whose
-        position and attitude are kept as `StatedStart`. A plain matrix of seven columns is
-        accepted if the last is a steady clock and the norm of the velocity increments over a
-        step is that of gravity. Any other text is read as a table.
-
-    Raises
-    ------
-    DataError
-        The file is not text, the header is invalid, or a row has another width or no integer.
+    Columns ``dtheta_x`` … in rad and ``dv_x`` … in m/s, with ``time`` at the end of each interval.
+    A SIMU log is converted with the scale factors and clock of its header, whose position and
+    attitude are kept as `StatedStart`. A plain matrix of seven columns is accepted if the last is a
+    steady clock and the norm of the velocity increments over a step is that of gravity. Any other
+    text is read as a table.
     """
     data = path.read_bytes()
     text, findings = csv.decoded(data, path.name)
@@ -405,19 +378,17 @@ def _simu(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> Raw
     )
     stamps = np.asarray(t0 + step * np.arange(1.0, len(counts) + 1.0))
     roll, pitch, heading = start.roll_pitch_heading_deg
-    findings.append(
-        Finding(
-            "io.header-states-roll-pitch-heading",
-            file=path.name,
-            quantity="start",
-            severity="note",
-            roll=roll,
-            pitch=pitch,
-            heading=heading,
-            lat_deg=start.lat_deg,
-            lon_deg=start.lon_deg,
-            alt=start.alt,
-        )
+    add_note(
+        findings,
+        "io.header-states-roll-pitch-heading",
+        file=path.name,
+        quantity="start",
+        roll=roll,
+        pitch=pitch,
+        heading=heading,
+        lat_deg=start.lat_deg,
+        lon_deg=start.lon_deg,
+        alt=start.alt,
     )
     return _log_of_psins(path, stamps, np.asarray(counts * factors), rows, AXES, findings, start)
 
@@ -506,14 +477,13 @@ def _matrix(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> R
     if not _GRAVITY[0] <= force <= _GRAVITY[1] or not turned < 2.0 * math.pi:
         return None
     up = float(np.median(block[:, 5])) / usual > 0.5 * force
-    findings.append(
-        Finding(
-            "io.taken-for-psins" if up else "io.taken-for-psins-axes-open",
-            file=path.name,
-            severity="note" if up else "warning",
-            rate_hz=1.0 / usual,
-            force=force,
-        )
+    add_warning(
+        findings,
+        "io.taken-for-psins" if up else "io.taken-for-psins-axes-open",
+        file=path.name,
+        severity="note" if up else "warning",
+        rate_hz=1.0 / usual,
+        force=force,
     )
     return _log_of_psins(path, time, block[:, :6], rows, AXES if up else None, findings, None)
 
@@ -523,9 +493,7 @@ def _block(
 ) -> tuple[Array, NDArray[np.int64]]:
     """Return the numbers of all rows; drop a last row that may have lost digits."""
     if lines and (not ended or len(lines[-1][1].split()) < width):
-        findings.append(
-            Finding("io.last-line-does-not-end", severity="note", file=file, row=lines[-1][0])
-        )
+        add_note(findings, "io.last-line-does-not-end", file=file, row=lines[-1][0])
         lines = lines[:-1]
     if not lines:
         raise DataError("io.header-no-samples-under-2", file=file)
@@ -582,23 +550,20 @@ COLUMNS = [*(f"gyro_{a}" for a in "xyz"), *(f"accel_{a}" for a in "xyz")]
 def _holds(path: Path, *names: str) -> bool:
     if not path.is_file() or path.suffix.lower() != ".npz":
         return False
-    return set(names) <= _names(path, state_of(path))
+    return set(names) <= _names(path)
 
 
-@lru_cache(maxsize=4)
-def _names(path: Path, _state: tuple[Any, ...]) -> frozenset[str]:
+@while_unchanged(4)
+def _names(path: Path) -> frozenset[str]:
     return frozenset(parse("archives.array_names", path))
 
 
 STREAMS = {"imu": ("time", "imu"), "gnss": ("fix_time", "fix"), "reference": ("time", "truth")}
 
 
-def _has_stream(path: Path) -> bool:
-    """Whether the archive has the arrays of a stream."""
-    return any(_holds(path, *names) for names in STREAMS.values())
-
-
-detect_python_ins = Signs(suffixes=(".npz",), also=_has_stream)
+detect_python_ins = Signs(
+    suffixes=(".npz",), also=lambda path: any(_holds(path, *names) for names in STREAMS.values())
+)
 
 
 def _arrays(path: Path, stream: str, width: int) -> tuple[Array, Array]:
@@ -622,13 +587,7 @@ def _arrays(path: Path, stream: str, width: int) -> tuple[Array, Array]:
 
 
 def read_python_ins(path: Path) -> RawLog:
-    """Read the angular rates and specific force.
-
-    Raises
-    ------
-    DataError
-        The archive is damaged, or its arrays have the wrong shapes.
-    """
+    """Read the angular rates and specific force."""
     time, imu = _arrays(path, "imu", len(COLUMNS))
     units = {"gyro": "rad/s", "accel": "m/s2"}
     columns = {n: (imu[:, k], units[n.partition("_")[0]]) for k, n in enumerate(COLUMNS)}
@@ -641,14 +600,8 @@ def read_python_ins_fixes(path: Path) -> Fixes:
     return Fixes(path.name, time, place, np.arange(1, time.size + 1))
 
 
-def read_python_ins_truth(path: Path) -> pd.DataFrame:
-    """Read the trajectory.
-
-    Returns
-    -------
-    DataFrame
-        A Trajectory table.
-    """
+def read_python_ins_reference(path: Path) -> pd.DataFrame:
+    """Read the trajectory."""
     time, truth = _arrays(path, "reference", 9)
     table = trajectory_table(time, truth[:, :3], truth[:, 3:6], truth[:, 6:], source=path.name)
     table.attrs["findings"] = ()

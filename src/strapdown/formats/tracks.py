@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.join import join
@@ -49,14 +49,8 @@ QUALITY = {"none": 0.0, "dgps": 2.0, "pps": 3.0}
 detect_gpx = Signs(text=r"\A[\s\S]{0,4092}?<gpx")
 
 
-def read_gpx(path: Path) -> RawLog:
-    """Read the points that have a time.
-
-    Raises
-    ------
-    DataError
-        The library is missing, the XML is damaged, or no point has a time.
-    """
+def read_gpx_fixes(path: Path) -> RawLog:
+    """Read the points that have a time."""
     points = parse("recorders.gpx", path)
     times = points["time"]
     timed = np.array([t is not None for t in times], dtype=bool)
@@ -83,15 +77,13 @@ def read_gpx(path: Path) -> RawLog:
 def _points_with_time(log: RawLog, timed: NDArray[np.bool_]) -> RawLog:
     """Keep the points that have a time; others are reported."""
     if not timed.all():
-        log.findings.append(
-            Finding(
-                "io.points-without-time",
-                file=log.name,
-                quantity="time",
-                severity="note",
-                lost=int((~timed).sum()),
-                count=timed.size,
-            )
+        add_note(
+            log.findings,
+            "io.points-without-time",
+            file=log.name,
+            quantity="time",
+            lost=int((~timed).sum()),
+            count=timed.size,
         )
     return selected(log, timed)
 
@@ -112,7 +104,7 @@ def _is_kml(path: Path) -> bool:
     return path.suffix.lower() == ".kmz" or not head(path).startswith("PK")
 
 
-def read_kml(path: Path) -> RawLog:
+def read_kml_fixes(path: Path) -> RawLog:
     """Read the points that have a time.
 
     Raises
@@ -166,7 +158,7 @@ _TIMES_OF_PATH = ("coordTimes", "times", "timestamps")
 detect_geojson = Signs(text=r'\A\s*\{[\s\S]{0,2000}?"(?:FeatureCollection|Feature)"')
 
 
-def read_geojson(path: Path) -> RawLog:
+def read_geojson_fixes(path: Path) -> RawLog:
     """Read the points that have a time.
 
     Raises
@@ -311,13 +303,7 @@ detect_fit = Signs(first=rb"\A[\x0c\x0e].{7}\.FIT")
 
 
 def read_fit(path: Path) -> RawLog:
-    """Read the gyro, with accelerometer and magnetometer interpolated to its stamps.
-
-    Raises
-    ------
-    DataError
-        The library is missing, or the file is damaged.
-    """
+    """Read the gyro, with accelerometer and magnetometer interpolated to its stamps."""
     messages = _messages(path)
     logs = [_sensor(path, messages, triad) for triad in SENSORS if messages[SENSORS[triad][0]]]
     if not messages["gyroscope_data"]:
@@ -352,16 +338,14 @@ def read_fit_fixes(path: Path) -> RawLog:
     if np.isfinite(accuracy := values("gps_accuracy")).any():
         held["horizontal_accuracy"] = (accuracy, "m")
     rows = np.array([m["#"] for m in records])
-    findings = []
+    findings: list[Finding] = []
     if lost := len(messages["record"]) - len(records):
-        findings.append(
-            Finding(
-                "io.records-without-place",
-                file=path.name,
-                severity="note",
-                lost=lost,
-                count=len(messages["record"]),
-            )
+        add_note(
+            findings,
+            "io.records-without-place",
+            file=path.name,
+            lost=lost,
+            count=len(messages["record"]),
         )
     return RawLog.of(path, held, clock=clock, rows=rows, findings=findings)
 
@@ -488,14 +472,8 @@ def _has_positions(path: Path) -> bool:
 detect_dji = Signs(text=r"\A[\s\S]{0,4080}?\d:\d\d:\d\d[,.]\d{1,3}\s*-->", also=_has_positions)
 
 
-def read_dji(path: Path) -> RawLog:
-    """Read the positions.
-
-    Raises
-    ------
-    DataError
-        No subtitle has a position, or the angles may be in radians.
-    """
+def read_dji_fixes(path: Path) -> RawLog:
+    """Read the positions."""
     text, findings = csv.decoded(path.read_bytes(), path.name)
     starts = list(_TIME.finditer(text))
     ends = [*(m.start() for m in starts[1:]), len(text)]
@@ -526,14 +504,8 @@ def read_dji(path: Path) -> RawLog:
             lon=lons[~none][0],
         )
     if lost:
-        findings.append(
-            Finding(
-                "io.subtitles-without-place",
-                file=path.name,
-                severity="note",
-                lost=lost,
-                count=len(starts),
-            )
+        add_note(
+            findings, "io.subtitles-without-place", file=path.name, lost=lost, count=len(starts)
         )
     held = {
         "time": (time, "s"),

@@ -22,13 +22,6 @@ from strapdown.rotation import within_half_turn
 from strapdown.tables import EULER, VELOCITY, trajectory_table
 from strapdown.tables.checks import HEIGHTS_AS_STATED
 
-__all__ = [
-    "find_trajectory_columns",
-    "judge_trajectory",
-    "read_trajectory",
-]
-
-
 Array = NDArray[np.float64]
 
 
@@ -169,11 +162,7 @@ def judge_trajectory(
     if plain < DISAGREE:
         return []
     readings: list[tuple[str, Callable[[], float], bool]] = [
-        (
-            "io.lat-lon-exchanged",
-            lambda: misfit(lon, lat),
-            bool(np.abs(lon).max() <= 90.0),
-        ),
+        ("io.lat-lon-exchanged", lambda: misfit(lon, lat), bool(np.abs(lon).max() <= 90.0)),
         (
             "io.lat-lon-in-radians",
             lambda: misfit(np.degrees(lat), np.degrees(lon)),
@@ -184,12 +173,7 @@ def judge_trajectory(
         if possible and (other := of()) < AGREE:
             raise DataError(code, file=file, quantity="lat, lon", misfit=plain, other=other)
     return [
-        Finding(
-            "io.positions-and-velocities-disagree",
-            file=file,
-            quantity="lat, lon",
-            plain=plain,
-        )
+        Finding("io.positions-and-velocities-disagree", file=file, quantity="lat, lon", plain=plain)
     ]
 
 
@@ -207,9 +191,5 @@ def _refuse_radians_of_attitude(euler: Array, velocity: Array, file: str | None)
     # No vehicle moves 20 deg off its heading and, by coincidence, along 57 times its heading.
     if plain > 20.0 and radians < 5.0:
         raise DataError(
-            "io.heading-in-radians",
-            file=file,
-            quantity="heading",
-            plain=plain,
-            radians=radians,
+            "io.heading-in-radians", file=file, quantity="heading", plain=plain, radians=radians
         )

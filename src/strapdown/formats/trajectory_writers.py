@@ -41,22 +41,6 @@ from strapdown.tables import (
 )
 from strapdown.tables.on_disk import let_go, parts_of
 
-__all__ = [
-    "DECIMALS",
-    "Thinned",
-    "cut_at_date_line",
-    "named_columns",
-    "one_line",
-    "thin",
-    "told_of",
-    "write_csv",
-    "write_decimals",
-    "write_error_csv",
-    "write_geojson",
-    "write_kml",
-    "write_parquet",
-]
-
 #: Decimals of time, latitude, longitude, height, velocity and attitude, for fixed digits.
 DECIMALS = (9, 11, 11, 6, 8, 8, 8, 9, 9, 9)
 
@@ -119,11 +103,7 @@ def write_csv(path: Path, trajectory: pd.DataFrame, options: FileOptions | None 
         return
     head = "".join(f"# {key}: {value}\n" for key, value in comments.items())
     write_decimals(
-        path,
-        list(columns.values()),
-        DECIMALS,
-        separator=",",
-        head=f"{head}{','.join(columns)}\n",
+        path, list(columns.values()), DECIMALS, separator=",", head=f"{head}{','.join(columns)}\n"
     )
 
 
@@ -367,20 +347,14 @@ def write_kml(path: Path, trajectory: pd.DataFrame, options: FileOptions | None 
 
     Parameters
     ----------
-    path : Path
-    trajectory : DataFrame
-        A Trajectory or Gnss table of one row or more, on WGS 84.
-    options : FileOptions, optional
-        With `epoch`, a track with dates (``gx:Track``, Google's extension) is written in
-        addition to the path. More than `most_points` rows are thinned to those that preserve
-        the path best (`thin`).
+    path, trajectory, options
+        As `write_geojson`. With `epoch`, a track with dates (``gx:Track``, Google's extension) is
+        written in addition to the path.
 
     Raises
     ------
-    ConfigError
-        The ellipsoid is not WGS 84.
-    DataError
-        The table is not valid, or has no rows.
+    ConfigError, DataError
+        As `write_geojson`.
 
     Notes
     -----
@@ -520,15 +494,9 @@ LONGEST_PIECE = 4096
 class Thinned:
     """Rows that represent a trajectory on a map.
 
-    Attributes
-    ----------
-    rows : ndarray of int
-        In order, including both ends.
-    samples : int
-        Number of rows of the trajectory.
-    deviation_m : float, m
-        Largest distance of a dropped position from the straight line between its neighbors, at
-        its own time.
+    `rows`: in order, including both ends. `samples`: number of rows of the trajectory.
+    `deviation_m` (m): largest distance of a dropped position from the straight line between its
+    neighbors, at its own time.
     """
 
     rows: NDArray[np.intp]

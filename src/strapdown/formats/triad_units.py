@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.arrays import as_rows, numbers
 from strapdown.formats.columns import parse_axes, read_name
 from strapdown.formats.find_columns import AXES, Column
@@ -17,6 +17,7 @@ from strapdown.formats.inference.conclusion import THRESHOLD, Inference
 from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import APPLE
+from strapdown.tables import SAMPLINGS
 from strapdown.tables.checks import all_finite
 from strapdown.tables.on_disk import let_go, room
 from strapdown.units import (
@@ -30,108 +31,109 @@ from strapdown.units import (
     parse_unit,
 )
 
-__all__ = [
-    "OPEN",
-    "SUMS",
-    "Axes",
-    "axes_matrix",
-    "body_axes",
-    "intervals",
-    "left_out",
-    "mirrored",
-    "sampling_of_sums",
-    "sum_of",
-    "told_by_numbers",
-    "unit_of_counts",
-    "units_of_triads",
-    "values_of_triads",
-]
-
 Array = NDArray[np.float64]
+#: Units of a triad, and of its increments.
+UNITS = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "mag": MAG_UNITS}
+SUMS: dict[str, dict[str, float]] = {"gyro": GYRO_SUMS, "accel": ACCEL_SUMS, "mag": {}}
+#: Unit choices for a name that states increments without a unit.
+OPEN = {triad: " or ".join(units) for triad, units in SUMS.items()}
+# Unit of the increments for each unit of rate.
+_SUM_OF = {"rad/s": "rad", "deg/s": "deg", "m/s2": "m/s", "g": "g*s"}
+#: Least probability of an answer that is proposed.
+LIKELY = 0.9
 
 
-def told_by_numbers(
-    raw: RawLog,
-    found: dict[str, Column],
-    options: ReadOptions,
-    values: dict[str, Array],
-    ticks: NDArray[Any] | None,
-    dated: bool,
-) -> dict[str, Inference]:
-    """Run the inference on the numbers.
+@dataclass
+class LogInUse:
+    """A log on its way to a recording: what is stated, found and inferred.
 
-    `values` ((n, 3)): from `values_of_triads`. `ticks` ((n,)): stamps as in the file. `dated`:
-    whether they were dates, now converted to ns. Returns by quantity.
+    `found`: column of each quantity. `findings`, `questions`: what is reported and asked. `values`
+    ((n, 3)): of each usable triad, as in the file. `said`: inferences from them, by quantity.
+    """
+
+    raw: RawLog
+    options: ReadOptions
+    questions: Questions
+    found: dict[str, Column]
+    findings: list[Finding]
+    values: dict[str, Array] = field(default_factory=dict)
+    said: dict[str, Inference] = field(default_factory=dict)
+
+    def note(self, code: str, quantity: str, **data: Any) -> None:
+        """Add a note about the log."""
+        add_note(self.findings, code, file=self.raw.name, quantity=quantity, **data)
+
+    def warn(self, code: str, quantity: str, **data: Any) -> None:
+        """Add a warning about the log, unless `data` have another severity."""
+        add_warning(self.findings, code, file=self.raw.name, quantity=quantity, **data)
+
+    def columns(self, triad: str) -> list[Column]:
+        """Return the columns of the three axes."""
+        return [self.found[f"{triad}_{a}"] for a in AXES]
+
+
+def told_by_numbers(log: LogInUse, ticks: NDArray[Any] | None, dated: bool) -> dict[str, Inference]:
+    """Run the inference on the numbers; by quantity.
+
+    `ticks` ((n,)): stamps as in the file. `dated`: whether they were dates, now converted to ns.
     """
     unit = "ns" if dated else None
     if ticks is not None and not dated:
-        asked = options.time_unit
-        unit = parse_unit(asked, "time") if asked else found["time"].unit
-    signals = Signals(
-        ticks,
-        values["gyro"],
-        values.get("accel"),
-        values.get("mag"),
-        time_unit=unit,
-        rate=options.rate or raw.rate,
-    )
+        asked = log.options.time_unit
+        unit = parse_unit(asked, "time") if asked else log.found["time"].unit
+    values, rate = log.values, log.options.rate or log.raw.rate
+    triads = values["gyro"], values.get("accel"), values.get("mag")
+    signals = Signals(ticks, *triads, time_unit=unit, rate=rate)
     said = {i.quantity: i for i in infer_signals(signals)}
     up = said.get("up_axis")
     if up is not None and up.value is not None:
-        stated = _stated_unit(raw, found, "accel", options)
+        stated = _stated_unit(log, "accel")
         if stated and factor_of(stated[0], {**UNITS["accel"], **SUMS["accel"]}) < 0.0:
             said["up_axis"] = _reversed(up)
     return said
 
 
+def _opposite(axis: str) -> str:
+    return axis[1:] if axis.startswith("-") else f"-{axis}"
+
+
 def _reversed(up: Inference) -> Inference:
     """Return which axis points up for a sensor that reads -1 g upward."""
     axis, (first, *rest) = str(up.value), up.evidence
-    other = axis[1:] if axis.startswith("-") else f"-{axis}"
+    other = _opposite(axis)
     said = (first.replace(axis=other), *rest)
     shares = tuple((axis, share) for _, share in up.alternatives)
     return replace(up, value=other, evidence=said, alternatives=shares)
 
 
 #: Questions about an accelerometer that its numbers do not answer.
-_OPEN = {
-    "io.counts-unit-not-stated",
-    "io.counts-unit-undecided",
-    "io.file-leaves-open-whether",
-}
+_OPEN = {"io.counts-unit-not-stated", "io.counts-unit-undecided", "io.file-leaves-open-whether"}
 
 
-def units_of_triads(
-    raw: RawLog,
-    found: dict[str, Column],
-    options: ReadOptions,
-    values: dict[str, Array],
-    said: dict[str, Inference],
-    findings: list[Finding],
-    questions: Questions,
-) -> dict[str, tuple[str, str]]:
+def units_of_triads(log: LogInUse) -> dict[str, tuple[str, str]]:
     """Return the unit of each usable triad, with the reason.
 
-    `values` ((n, 3)). `said`: from `told_by_numbers`. `findings`: dropped triads and inferences are
-    appended. `questions`: an unknown unit of the gyro, and statements that the numbers contradict.
+    Dropped triads and inferences are reported; an unknown unit of the gyro, and statements that the
+    numbers contradict, are asked.
     """
     units: dict[str, tuple[str, str]] = {}
     asked: set[str] = set()
     gyro_asked = False
-    for triad, block in values.items():
-        if triad == "accel" and _without_gravity(found, said):
-            findings.append(_not_used(raw, triad, "io.left-out-linear-acceleration"))
+    for triad in log.values:
+        if triad == "accel" and _without_gravity(log):
+            log.note("io.left-out-linear-acceleration", triad)
             continue
-        stated = _stated_unit(raw, found, triad, options)
-        findings += _overruled(raw, found, triad, options, said.get(f"{triad}_unit"))
-        if stated is None or raw.checked or getattr(options, f"{triad}_unit", None):
+        stated = _stated_unit(log, triad)
+        likely = log.said.get(f"{triad}_unit")
+        _report_overruled(log, triad, likely)
+        if stated is None or log.raw.checked or getattr(log.options, f"{triad}_unit", None):
             asked.add(triad)
         try:
             if stated is None:
-                _refuse_open(raw, found, triad)
-            units[triad] = stated or inferred_unit(triad, said, block, raw.name, findings)
+                _refuse_open(log, triad)
+            units[triad] = stated or _inferred_unit(log, triad)
         except DataError as error:
-            likely, code = said.get(f"{triad}_unit"), error.finding.code
+            code = error.finding.code
             sure = likely is not None and likely.value and likely.confidence >= LIKELY
             unit = str(likely.value) if likely is not None and sure else "UNIT"
             counts = unit_of_counts(likely)
@@ -139,98 +141,77 @@ def units_of_triads(
                 # Beside a gyro whose unit is asked, that of its accelerometer is asked, too.
                 if triad == "accel" and gyro_asked:
                     if code in _OPEN:
-                        questions.ask(error.finding, accel_unit=counts or "UNIT")
+                        log.questions.ask(error.finding, accel_unit=counts or "UNIT")
                     elif code == "io.unit-undecided" and sure:
-                        questions.ask(error.finding, accel_unit=unit)
-                findings.append(left_out(raw, triad, error))
+                        log.questions.ask(error.finding, accel_unit=unit)
+                _leave_out(log, triad, error)
                 continue
             unit = counts or unit
             if code == "io.unit-not-stated-of-increments":
                 unit = str(error.finding.data["sum_of"]).split(" or ")[0]
-            questions.ask(error.finding, gyro_unit=unit)
+            log.questions.ask(error.finding, gyro_unit=unit)
             units[triad] = "rad/s" if unit == "UNIT" else unit, "asked"
             gyro_asked = True
-    mirror = options.axes is not None and mirrored(*parse_axes(options.axes))
     plain = {t: u for t, (u, _) in units.items()}
-    report_contradictions(said, plain, asked, mirror, raw.name, findings, questions)
-    if (beyond := _beyond_full_scale(said, plain, asked, values["gyro"])) is not None:
-        questions.ask(beyond.replace(file=raw.name), gyro_unit=str(beyond.data["likely"]))
+    _report_contradictions(log, plain, asked)
+    _ask_beyond_full_scale(log, plain, asked)
     return units
 
 
-def _without_gravity(found: dict[str, Column], said: dict[str, Inference]) -> bool:
+def _without_gravity(log: LogInUse) -> bool:
     """Whether a column named linear acceleration has no gravity, as far as numbers decide.
 
     Beside an angular velocity the name is that of ROS, whose linear acceleration has gravity (REP
     145), so that less is needed to believe it.
     """
-    column, gravity = found["accel_x"], said.get("gravity")
+    column, gravity = log.found["accel_x"], log.said.get("gravity")
     if column.basis != "name" or not read_name(column.source).linear:
         return False
     if gravity is None or gravity.value != "present":
         return True
-    of_ros = "angular" in found["gyro_x"].source.lower()
+    of_ros = "angular" in log.found["gyro_x"].source.lower()
     return not gravity.settled and not (of_ros and gravity.confidence >= LIKELY)
 
 
-def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
+def _refuse_open(log: LogInUse, triad: str) -> None:
     """Refuse a unit that the file leaves open: the numbers cannot decide between f and -f."""
-    column = found[f"{triad}_x"]
+    raw, column = log.raw, log.found[f"{triad}_x"]
     unit = column.unit
     # A clock may be local, too, so that this is a unit of nothing else.
     local = re.search(r"\blocal\b", f"{column.source} {raw.units.get(column.source)}")
     if unit in RELATIVE_FIELDS or (triad == "mag" and unit is None and local):
-        raise DataError("io.mag-unit-relative", file=raw.name, quantity=triad, source=column.source)
+        raise raw.fault("io.mag-unit-relative", triad, source=column.source)
     apple = any(re.sub(r"\W", "", name).lower() in APPLE for name in raw.columns)
     if triad == "accel" and unit is None and apple:
         unit = "-g or g"  # that of CoreMotion, or turned by the application
     if unit is None and read_name(column.source).increment:
         unit = OPEN[triad]
     if unit and " or " in unit:
-        raise DataError(
-            "io.file-leaves-open-whether", file=raw.name, quantity=triad, unit=unit, triad=triad
-        )
+        raise raw.fault("io.file-leaves-open-whether", triad, unit=unit, triad=triad)
 
 
-def _overruled(
-    raw: RawLog,
-    found: dict[str, Column],
-    triad: str,
-    options: ReadOptions,
-    likely: Inference | None,
-) -> list[Finding]:
-    """A warning where the user states another unit than the columns, and the numbers do not."""
-    asked = getattr(options, f"{triad}_unit", None)
-    columns = [found[f"{triad}_{a}"] for a in AXES]
+def _report_overruled(log: LogInUse, triad: str, likely: Inference | None) -> None:
+    """Warn where the user states another unit than the columns, and the numbers do not."""
+    asked, columns = getattr(log.options, f"{triad}_unit", None), log.columns(triad)
     stated = {c.unit for c in columns} - {None}
     if not asked or not stated or not stated <= set(UNITS[triad]):
-        return []
+        return
     unit = parse_unit(asked, triad)
     by_numbers = likely is not None and likely.value == unit and likely.confidence >= LIKELY
     # A sign is that of the axes, and no other unit.
     if by_numbers or {str(one).lstrip("-") for one in stated} == {unit.lstrip("-")}:
-        return []
-    return [
-        Finding(
-            "io.unit-stated-otherwise",
-            severity="warning",
-            file=raw.name,
-            quantity=triad,
-            unit=unit,
-            file_unit=", ".join(sorted(map(str, stated))),
-            source=columns[0].source,
-        )
-    ]
+        return
+    of_file = ", ".join(sorted(map(str, stated)))
+    log.warn(
+        "io.unit-stated-otherwise", triad, unit=unit, file_unit=of_file, source=columns[0].source
+    )
 
 
-def _stated_unit(
-    raw: RawLog, found: dict[str, Column], triad: str, options: ReadOptions
-) -> tuple[str, str] | None:
+def _stated_unit(log: LogInUse, triad: str) -> tuple[str, str] | None:
     # A magnetometer has no such option.
-    asked = getattr(options, f"{triad}_unit", None)
-    if asked:
-        return parse_unit(asked, triad), options.why(f"{triad}_unit")
-    columns = [found[f"{triad}_{a}"] for a in AXES]
+    if asked := getattr(log.options, f"{triad}_unit", None):
+        return parse_unit(asked, triad), log.options.why(f"{triad}_unit")
+    columns = log.columns(triad)
     units = {c.unit for c in columns}
     known = set(UNITS[triad])
     # Degrees often mean degrees per second: only a name that states increments is trusted.
@@ -239,52 +220,44 @@ def _stated_unit(
     unit = columns[0].unit
     if len(units) == 1 and unit is not None and unit in known:
         return unit, columns[0].why if columns[0].basis == "file" else "in its name"
-    if units == {None} and triad in raw.triad_units:
-        return parse_unit(raw.triad_units[triad], triad), "stated above the table"
+    if units == {None} and triad in log.raw.triad_units:
+        return parse_unit(log.raw.triad_units[triad], triad), "stated above the table"
     return None
 
 
-# Unusable triads are dropped, except the gyro, which suffices for an attitude.
-OPTIONAL = ("accel", "mag")
-
-
-def values_of_triads(
-    raw: RawLog, found: dict[str, Column], findings: list[Finding]
-) -> dict[str, Array]:
+def values_of_triads(log: LogInUse) -> dict[str, Array]:
     """Return the raw values of each usable triad; (n, 3).
 
-    `findings`: dropped triads are appended. DataError: the values of the gyro cannot be used.
+    Others are dropped and reported, except the gyro, which suffices for an attitude. DataError: the
+    values of the gyro cannot be used.
     """
-    values = {"gyro": _triad(raw, found, "gyro")}
-    for triad in OPTIONAL:
-        if not any(f"{triad}_{a}" in found for a in AXES):
+    values = {"gyro": _triad(log, "gyro")}
+    for triad in ("accel", "mag"):
+        missing = [f"{triad}_{a}" for a in AXES if f"{triad}_{a}" not in log.found]
+        if len(missing) == len(AXES):
             continue
-        missing = [f"{triad}_{a}" for a in AXES if f"{triad}_{a}" not in found]
         if missing:
-            findings.append(_not_used(raw, triad, "io.left-out-without-axes", missing=missing))
+            log.note("io.left-out-without-axes", triad, missing=missing)
             continue
         try:
-            block = _triad(raw, found, triad)
+            block = _triad(log, triad)
         except DataError as error:
-            findings.append(left_out(raw, triad, error))
+            _leave_out(log, triad, error)
             continue
         bad = np.zeros(1, dtype=bool) if all_finite(block) else ~np.isfinite(block)
         if bad.all():
-            findings.append(_not_used(raw, triad, "io.left-out-without-number"))
-        elif triad == "mag" and bad.any() and triad not in raw.sparse:
+            log.note("io.left-out-without-number", triad)
+        elif triad == "mag" and bad.any() and triad not in log.raw.sparse:
             empty = int(bad.any(axis=1).sum())
-            findings.append(_not_used(raw, triad, "io.left-out-rows-without-number", count=empty))
+            log.note("io.left-out-rows-without-number", triad, count=empty)
         else:
             values[triad] = block
     return values
 
 
-def _not_used(raw: RawLog, triad: str, code: str, **data: Any) -> Finding:
-    return Finding(code, file=raw.name, quantity=triad, severity="note", **data)
-
-
-def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array:
-    parts = [numbers(raw, found[f"{triad}_{a}"].source, f"{triad}_{a}") for a in AXES]
+def _triad(log: LogInUse, triad: str) -> Array:
+    columns = zip(log.columns(triad), AXES, strict=True)
+    parts = [numbers(log.raw, column.source, f"{triad}_{a}") for column, a in columns]
     # Column by column, as it came and as the Imu table has it.
     rows = as_rows(parts)
     if rows is None:
@@ -295,15 +268,10 @@ def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array:
     return rows.T
 
 
-def left_out(raw: RawLog, triad: str, error: DataError) -> Finding:
-    """Make the finding that a triad is not used, with the reason."""
-    return Finding(
-        "io.left-out-unusable",
-        file=raw.name,
-        row=error.finding.row,
-        quantity=triad,
-        reason=error.finding,
-    )
+def _leave_out(log: LogInUse, triad: str, error: DataError) -> None:
+    """Report that a triad is not used, with the reason."""
+    fault = error.finding
+    log.warn("io.left-out-unusable", triad, row=fault.row, reason=fault)
 
 
 @dataclass(frozen=True)
@@ -326,62 +294,64 @@ def mirrored(axis: list[int], sign: list[float]) -> bool:
     return bool(np.linalg.det(axes_matrix(axis, sign)) < 0)
 
 
-def body_axes(
-    raw: RawLog, options: ReadOptions, said: dict[str, Inference], findings: list[Finding]
-) -> Axes:
+# Axes with each axis of the sensor up.
+_EXAMPLES = {"z": "x,-y,-z", "y": "-z,x,-y", "-y": "z,x,y", "x": "y,z,-x", "-x": "y,-z,x"}
+
+
+def body_axes(log: LogInUse) -> Axes:
     """Return the axes stated by the user, else by the file, else the sensor's own.
 
-    `said`: inferences from the numbers. `findings`: assumptions and doubts are appended.
+    Whether gravity agrees with them, or shows others, is reported.
     """
-    text = options.axes or raw.axes
+    options, up = log.options, log.said.get("up_axis")
+    text = options.axes or log.raw.axes
     if text is None:
-        findings.append(axes_against_gravity(said).replace(file=raw.name, quantity="axes"))
+        if up is None or up.value is None or up.confidence < 0.5:
+            log.note("io.axes-not-stated", "axes")
+        else:
+            axis, percent = str(up.value), up.evidence[0].data["percent"]
+            if axis == "-z":
+                data = {"percent": percent, "probability": up.confidence}
+                log.note("io.axes-not-stated", "axes", data=data)
+            else:
+                code = {"z": "io.axes-not-stated-z-up", "y": "io.axes-not-stated-y-up"}.get(axis)
+                log.warn(
+                    code or "io.axes-not-stated-other-up",
+                    "axes",
+                    up=axis,
+                    percent=percent,
+                    down=_opposite(axis),
+                    example=_EXAMPLES[axis],
+                )
         return Axes([0, 1, 2], [1.0, 1.0, 1.0], "as they are", stated=False)
-    axis, sign = parse_axes(text)
+    axis_of, sign = parse_axes(text)
     if options.axes or text == "x,y,z":
-        down = ("-" if sign[2] < 0 else "") + AXES[axis[2]]
-        report_upside_down(said, down, raw.name, findings)
-    if options.axes and mirrored(axis, sign):
-        findings.append(
-            Finding(
-                "io.axes-mirrored",
-                file=raw.name,
-                quantity="axes",
-                severity="note",
-                text=text,
-            )
-        )
+        down = ("-" if sign[2] < 0 else "") + AXES[axis_of[2]]
+        if up is not None and up.value == down and up.confidence >= 0.8:
+            log.warn("io.axes-upside-down", "axes", axis=down, evidence=up.evidence[0])
+    if options.axes and mirrored(axis_of, sign):
+        log.note("io.axes-mirrored", "axes", text=text)
     why = f"{text} {'by --axes' if options.axes else 'of this kind of recording'}"
-    return Axes(axis, sign, why)
+    return Axes(axis_of, sign, why)
 
 
 # Statements of a log and its user against the numbers.
 
 
-UNITS = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "mag": MAG_UNITS}
 # Sensor suggested for raw counts, that of most boards (InvenSense, MPU-6000 and MPU-6050 Product
 # Specification, revision 3.4, sections 6.1 and 6.2).
 _COUNTS = {"gyro": "io.example-gyro-counts", "accel": "io.example-accel-counts"}
 _LIKELY_COUNTS = {"gyro": "io.likely-gyro-counts", "accel": "io.likely-accel-counts"}
-#: Least probability of an answer that is proposed.
-LIKELY = 0.9
-# Axes with each axis of the sensor up.
-_EXAMPLES = {"z": "x,-y,-z", "y": "-z,x,-y", "-y": "z,x,y", "x": "y,z,-x", "-x": "y,-z,x"}
 # Values shown for a unit that the numbers leave open.
 _CHOICES = {"gyro": ("rad/s", "deg/s"), "accel": ("m/s2", "g"), "mag": ("uT", "gauss")}
 
 
-def inferred_unit(
-    triad: str, said: dict[str, Inference], values: Array, file: str, findings: list[Finding]
-) -> tuple[str, str]:
-    """Infer the unit of a triad, which is not stated, from its numbers.
+def _inferred_unit(log: LogInUse, triad: str) -> tuple[str, str]:
+    """Infer the unit of a triad, which is not stated, from its numbers; the inference is reported.
 
-    `triad` ({'gyro', 'accel', 'mag'}). `said`: by quantity. `values` ((n, 3)). `findings`:
-    inferences are appended. DataError: the probability does not reach 0.99, or the numbers are
-    increments.
+    DataError: the probability does not reach 0.99, or the numbers are increments.
     """
-    unit = said.get(f"{triad}_unit")
-    form = said.get(f"{triad}_form")
+    file, unit, form = log.raw.name, log.said.get(f"{triad}_unit"), log.said.get(f"{triad}_form")
     if form is not None and form.value == "increment" and form.confidence > 0.5:
         raise DataError(
             "io.unit-not-stated-of-increments",
@@ -390,13 +360,14 @@ def inferred_unit(
             evidence=form.evidence,
             confidence=form.confidence,
             triad=triad,
-            sum_of=sum_of(str(unit.value) if unit is not None and unit.settled else None, triad),
+            sum_of=_sum_of(str(unit.value) if unit is not None and unit.settled else None, triad),
         )
     if unit is not None and unit.settled and (form is None or form.value == "rate"):
         code = "io.mag-unit-inferred" if triad == "mag" else "io.unit-inferred"
-        findings.append(unit.finding(code, file=file, quantity=f"unit of {triad}", triad=triad))
+        log.findings.append(unit.finding(code, file=file, quantity=f"unit of {triad}", triad=triad))
         return str(unit.value), str(unit)
-    raise DataError(_undecided(triad, unit, values).replace(file=file, quantity=triad))
+    undecided = _undecided(triad, unit, log.values[triad])
+    raise DataError(undecided.replace(file=file, quantity=triad))
 
 
 def _undecided(triad: str, unit: Inference | None, values: Array) -> Finding:
@@ -413,21 +384,13 @@ def _undecided(triad: str, unit: Inference | None, values: Array) -> Finding:
         code = "io.mag-unit-not-stated" if unit is None else "io.mag-unit-undecided"
     elif bool((values == np.round(values)).all()):
         code = "io.counts-unit-not-stated" if unit is None else "io.counts-unit-undecided"
-        unit_of_count = unit_of_counts(unit)
-        counts = Finding(
-            _COUNTS[triad] if unit_of_count is None else _LIKELY_COUNTS[triad],
-            severity="note",
-            unit=unit_of_count,
-        )
+        of_count = unit_of_counts(unit)
+        example = _COUNTS[triad] if of_count is None else _LIKELY_COUNTS[triad]
+        counts = Finding(example, severity="note", unit=of_count)
     else:
         code = "io.unit-not-stated" if unit is None else "io.unit-undecided"
-    return Finding(
-        code,
-        triad=triad,
-        choices=[_choice(triad, u, largest) for u in _CHOICES[triad]],
-        counts=counts,
-        **what_numbers_say(unit),
-    )
+    choices = [_choice(triad, u, largest) for u in _CHOICES[triad]]
+    return Finding(code, triad=triad, choices=choices, counts=counts, **what_numbers_say(unit))
 
 
 def unit_of_counts(unit: Inference | None) -> str | None:
@@ -447,48 +410,32 @@ def what_numbers_say(unit: Inference | None) -> dict[str, Any]:
 
 def _choice(triad: str, unit: str, largest: float) -> Finding:
     value = largest * UNITS[triad][unit]
+    data: dict[str, Any] = {"unit": unit, "largest": largest}
     if triad == "gyro":
         turns = np.degrees(value) / 360.0
-        return Finding(
-            "io.choice-of-gyro-unit", severity="note", unit=unit, largest=largest, turns=turns
-        )
+        return Finding("io.choice-of-gyro-unit", severity="note", **data, turns=turns)
     si = "µT" if triad == "mag" else "m/s²"
-    return Finding(
-        "io.choice-of-unit", severity="note", unit=unit, largest=largest, value=value, si=si
-    )
+    return Finding("io.choice-of-unit", severity="note", **data, value=value, si=si)
 
 
-def report_contradictions(
-    said: dict[str, Inference],
-    units: dict[str, str],
-    asked: set[str],
-    mirrored: bool,
-    file: str,
-    findings: list[Finding],
-    questions: Questions,
-) -> None:
-    """Report where the numbers contradict a file or a name.
+def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]) -> None:
+    """Report where the numbers contradict a file or a name; a contradiction in a unit is asked.
 
     `units`: triad to the unit that it is read in. `asked`: triads whose unit the user stated or the
-    numbers gave; these are not checked. `mirrored`: the user stated left-handed sensor axes.
-    `questions`: a contradiction in a unit, which the user has to decide.
+    numbers gave; these are not checked.
     """
+    said = log.said
     for triad, unit in units.items():
         other = said.get(f"{triad}_unit")
         form = said.get(f"{triad}_form")
         if triad in asked or other is None:
             continue
-        if triad == "gyro" and not other.settled and (likely := _instead(unit, other)):
-            fault = Finding(
-                "io.contradicts-unit",
-                file=file,
-                quantity=triad,
-                triad=triad,
-                unit=unit,
-                likely=likely,
-                reason=other.finding(),
-            )
-            questions.ask(fault, gyro_unit=likely)
+        code, why = "io.contradicts-unit", other
+        data: dict[str, Any] = {"file": log.raw.name, "quantity": triad, "triad": triad}
+        data["unit"] = unit
+        if triad == "gyro" and not other.settled and (instead := _instead(unit, other)):
+            fault = Finding(code, **data, likely=instead, reason=other.finding())
+            log.questions.ask(fault, gyro_unit=instead)
         if not other.settled:
             continue
         # Sizes of rates alone do not contradict a statement: gravity that rotated with them
@@ -499,51 +446,34 @@ def report_contradictions(
             continue
         likely = str(other.value)
         kind = form.value if form is not None and form.settled else None
-        reason = other
         if unit in SUMS[triad]:
             if kind != "rate" or form is None:
                 continue
-            code, reason = "io.looks-like-rates", form
+            code, why = "io.looks-like-rates", form
         elif kind == "increment" and form is not None:
-            code, reason = "io.looks-like-increments", form
-            likely = sum_of(likely, triad)
+            code, why = "io.looks-like-increments", form
+            likely = _sum_of(likely, triad)
         elif other.value != unit.lstrip("-") and (form is None or form.value == "rate"):
-            code = "io.mag-contradicts-unit" if triad == "mag" else "io.contradicts-unit"
+            code = "io.mag-contradicts-unit" if triad == "mag" else code
         else:
             continue
-        fault = Finding(
-            code,
-            file=file,
-            quantity=triad,
-            triad=triad,
-            unit=unit,
-            likely=likely,
-            reason=reason.finding(),
-        )
+        fault = Finding(code, **data, likely=likely, reason=why.finding())
         if triad == "mag":
-            findings.append(fault)
+            log.findings.append(fault)
         else:
-            questions.ask(fault, **{f"{triad}_unit": likely})
+            log.questions.ask(fault, **{f"{triad}_unit": likely})
     gravity = said.get("gravity")
     if "accel" in units and gravity is not None and gravity.settled and gravity.value == "removed":
-        findings.append(
-            Finding("io.no-gravity", file=file, quantity="accel", reason=gravity.finding())
-        )
+        log.warn("io.no-gravity", "accel", reason=gravity.finding())
     axes = said.get("gyro_axes")
     if axes is None or not axes.settled or axes.value == "x,y,z":
         return
-    reversed_sense = axes.value == "-x,-y,-z"
-    if reversed_sense and mirrored:
+    reversed_sense, stated = axes.value == "-x,-y,-z", log.options.axes
+    # Left-handed axes that the user states turn the sense of rotation.
+    if reversed_sense and stated is not None and mirrored(*parse_axes(stated)):
         return
-    findings.append(
-        Finding(
-            "io.gyro-turns-against-gravity" if reversed_sense else "io.gyro-axes-differ",
-            file=file,
-            quantity="gyro",
-            axes=axes.value,
-            reason=axes.finding(),
-        )
-    )
+    code = "io.gyro-turns-against-gravity" if reversed_sense else "io.gyro-axes-differ"
+    log.warn(code, "gyro", axes=axes.value, reason=axes.finding())
 
 
 def _instead(unit: str, inferred: Inference) -> str | None:
@@ -566,20 +496,19 @@ def _instead(unit: str, inferred: Inference) -> str | None:
 _FULL_SCALE, _LASTING = np.radians(2000.0), 2.0
 
 
-def _beyond_full_scale(
-    said: dict[str, Inference], units: dict[str, str], asked: set[str], gyro: Array
-) -> Finding | None:
-    """Doubt a unit by which a gyro is beyond its full scale for seconds; None if it may be right.
+def _ask_beyond_full_scale(log: LogInUse, units: dict[str, str], asked: set[str]) -> None:
+    """Ask for a unit by which a gyro is beyond its full scale for seconds.
 
     Gravity may turn too little, or accelerations hide it, so that no other unit is settled.
     """
-    other, unit, rate = said.get("gyro_unit"), units.get("gyro", ""), said.get("rate")
+    gyro, rate = log.values["gyro"], log.said.get("rate")
+    other, unit = log.said.get("gyro_unit"), units.get("gyro", "")
     if "gyro" in asked or unit not in GYRO_UNITS or other is None or other.settled:
-        return None
+        return
     if _instead(unit, other):  # asked already
-        return None
+        return
     if other.value is None or other.value == unit or rate is None or rate.value is None:
-        return None
+        return
     # A sensor at its full scale is not beyond it.
     full, likely = 1.001 * _FULL_SCALE, GYRO_UNITS[str(other.value)]
     largest = np.maximum(gyro.max(axis=1), -gyro.min(axis=1))
@@ -587,10 +516,11 @@ def _beyond_full_scale(
     beyond = largest[largest * GYRO_UNITS[unit] > full]
     seconds = beyond.size / float(rate.value)
     if seconds < _LASTING or float(np.median(beyond)) * likely > full:
-        return None
+        return
     usual = float(np.median(beyond))
-    return Finding(
+    fault = Finding(
         "io.rates-beyond-full-scale",
+        file=log.raw.name,
         quantity="gyro",
         triad="gyro",
         unit=unit,
@@ -600,63 +530,13 @@ def _beyond_full_scale(
         otherwise=usual * likely,
         reason=other.finding(),
     )
-
-
-def axes_against_gravity(said: dict[str, Inference]) -> Finding:
-    """Check by gravity whether axes taken as forward, right, down are correct.
-
-    Returns a note if gravity agrees, with its ``probability``, or is inconclusive.
-    """
-    up = said.get("up_axis")
-    if up is None or up.value is None or up.confidence < 0.5:
-        return Finding("io.axes-not-stated", severity="note")
-    if up.value == "-z":
-        data = {"percent": up.evidence[0].data["percent"], "probability": up.confidence}
-        return Finding("io.axes-not-stated", severity="note", data=data)
-    axis = str(up.value)
-    down = axis[1:] if axis.startswith("-") else f"-{axis}"
-    code = {"z": "io.axes-not-stated-z-up", "y": "io.axes-not-stated-y-up"}.get(axis)
-    return Finding(
-        code or "io.axes-not-stated-other-up",
-        up=axis,
-        percent=up.evidence[0].data["percent"],
-        down=down,
-        example=_EXAMPLES[axis],
-    )
-
-
-def report_upside_down(
-    said: dict[str, Inference], axis: str, file: str, findings: list[Finding]
-) -> None:
-    """Report that the stated axes have the sensor upside down.
-
-    `axis`: the sensor axis stated to point down.
-    """
-    up = said.get("up_axis")
-    if up is None or up.value != axis or up.confidence < 0.8:
-        return
-    findings.append(
-        Finding(
-            "io.axes-upside-down",
-            file=file,
-            quantity="axes",
-            axis=axis,
-            evidence=up.evidence[0],
-        )
-    )
+    log.questions.ask(fault, gyro_unit=str(other.value))
 
 
 # Increments of angle and velocity, converted to means over their steps.
 
-#: Units of increments, by triad.
-SUMS: dict[str, dict[str, float]] = {"gyro": GYRO_SUMS, "accel": ACCEL_SUMS, "mag": {}}
-#: Unit choices for a name that states increments without a unit.
-OPEN = {triad: " or ".join(units) for triad, units in SUMS.items()}
-# Unit of the increments for each unit of rate.
-_SUM_OF = {"rad/s": "rad", "deg/s": "deg", "m/s2": "m/s", "g": "g*s"}
 
-
-def sum_of(unit: str | None, triad: str) -> str:
+def _sum_of(unit: str | None, triad: str) -> str:
     """Return the unit of the increments of a rate, or the choice if the unit is unknown."""
     return _SUM_OF.get(unit or "", OPEN[triad])
 
@@ -674,29 +554,29 @@ def intervals(time: Array, kept: NDArray[np.int64]) -> Array:
     return np.asarray(length[:, None])
 
 
-def sampling_of_sums(
-    summed: set[str], triads: set[str], asked: str | None, file: str, findings: list[Finding]
-) -> str:
-    """Return the sampling of increments: always means, regardless of the file.
+def sampling_of(log: LogInUse, units: dict[str, tuple[str, str]]) -> str:
+    """Return the sampling stated by the user, else by the file, else instantaneous.
 
-    `summed`: triads that hold increments; not empty. `triads`: triads used. `asked`: sampling
-    stated by the user. `findings`: the conversion is appended. ConfigError: the user states
-    instantaneous values.
+    Increments are always means. Conversions and assumptions are reported. ConfigError: the sampling
+    is unknown, or the user states instantaneous values of increments.
     """
-    names = [t for t in ("gyro", "accel") if t in summed]
-    if asked and asked.lower() != "mean":
-        raise ConfigError(
-            "io.sampling-against-increments", quantity="--sampling", asked=asked, names=names
-        )
-    rest = [t for t in ("gyro", "accel") if t in triads - summed]
-    findings.append(
-        Finding(
-            "io.increments-made-means-with-rates" if rest else "io.increments-made-means",
-            file=file,
-            quantity="sampling",
-            severity="note",
-            names=names,
-            rest=rest,
-        )
-    )
-    return "mean"
+    asked = (log.options.sampling or "").lower()
+    plain = [t for t in ("gyro", "accel") if t in units]
+    names = [t for t in plain if units[t][0] in SUMS[t]]
+    if names:
+        if asked and asked != "mean":
+            raise ConfigError(
+                "io.sampling-against-increments",
+                quantity="--sampling",
+                asked=log.options.sampling,
+                names=names,
+            )
+        rest = [t for t in plain if t not in names]
+        code = "io.increments-made-means-with-rates" if rest else "io.increments-made-means"
+        log.note(code, "sampling", names=names, rest=rest)
+        return "mean"
+    if not (asked := asked or (log.raw.sampling or "").lower()):
+        log.note("io.sampling-taken-as-instantaneous", "sampling")
+        return "instantaneous"
+    check_choice("io.sampling-unknown", SAMPLINGS, quantity="--sampling", asked=asked)
+    return asked

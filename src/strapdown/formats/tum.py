@@ -28,8 +28,6 @@ from strapdown.frames import ecef_from_geodetic, geodetic_from_ecef, q_ne
 from strapdown.rotation import Q_NED_ENU
 from strapdown.tables import EULER, VELOCITY, check_trajectory, places_of, trajectory_table
 
-__all__ = ["TITLE", "detect", "poses", "read", "trajectory_of_poses", "write_tum"]
-
 TITLE = "poses as of the TUM RGB-D benchmark"
 Array = NDArray[np.float64]
 

@@ -22,30 +22,14 @@ from strapdown.units import (
     TIME_UNITS,
 )
 
-__all__ = [
-    "APPLE",
-    "CRASHES",
-    "FIXES",
-    "LOGS",
-    "QUANTITIES",
-    "TRAJECTORIES",
-    "Quantity",
-    "Vocabulary",
-]
-
 
 @dataclass(frozen=True)
 class Quantity:
     """A quantity that a file may hold.
 
-    Attributes
-    ----------
-    words : tuple of str
-        Names without blanks, signs and units, in lower case.
-    units : mapping of str to float
-        Its units, each with its factor to that of the table; empty if dimensionless.
-    negative : tuple of str
-        Further words, for the opposite sign: ``velup`` for a velocity down.
+    `words`: names without blanks, signs and units, in lower case. `units`: its units, each with its
+    factor to that of the table; empty if dimensionless. `negative`: further words, for the opposite
+    sign: ``velup`` for a velocity down.
     """
 
     words: tuple[str, ...]
@@ -57,21 +41,12 @@ class Quantity:
 class Vocabulary:
     """Names in one kind of file.
 
-    Attributes
-    ----------
-    quantities : mapping of str to Quantity
-        Names that mean a quantity as a whole.
-    kinds : sequence of str
-        Of units (`units.FACTORS`), in the order in which they decide.
-    before : re.Pattern, optional
-        Words that may stand before the name of a quantity.
-    sensors : mapping of str to str
-        ``gyro``, ``accel``, ``mag`` and ``gravity`` to the names of their quantities here; empty if
-        no names of sensors are read.
-    stems : mapping of str to tuple of str
-        Quantities to beginnings of words that are found anywhere in a name, in the order of search.
-    of : str
-        Object that the quantities describe, for messages.
+    `quantities`: names that mean a quantity as a whole. `kinds`: of units (`units.FACTORS`), in the
+    order in which they decide. `before`: words that may stand before the name of a quantity.
+    `sensors`: ``gyro``, ``accel``, ``mag`` and ``gravity`` to the names of their quantities here;
+    empty if no names of sensors are read. `stems`: quantities to beginnings of words that are found
+    anywhere in a name, in the order of search. `of`: object that the quantities describe, for
+    messages.
     """
 
     quantities: Mapping[str, Quantity]

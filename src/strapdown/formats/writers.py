@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_note, check_choice
 from strapdown.formats import (
     asl,
     csv,
@@ -43,8 +43,8 @@ from strapdown.formats.trajectory_writers import (
     write_kml,
     write_parquet,
 )
+from strapdown.formats.writing import FileOptions as FileOptions
 from strapdown.formats.writing import (
-    FileOptions,
     Tables,
     decimal_seconds,
     is_trajectory,
@@ -73,21 +73,6 @@ from strapdown.tables.checks import (
     VELOCITY_SD,
 )
 
-__all__ = [
-    "LOG_FORMATS",
-    "TRAJECTORY_FORMATS",
-    "WRITERS",
-    "FileOptions",
-    "Writer",
-    "find_writer",
-    "imu_columns",
-    "log_formats",
-    "table_columns",
-    "write_attitude_csv",
-    "write_streams",
-    "write_trajectory",
-]
-
 Array = NDArray[Any]
 AXES = "forward-right-down"
 #: A part that a format holds: always, or of tables with a column.
@@ -98,20 +83,11 @@ Part = str | tuple[str, str]
 class Writer:
     """How streams are written in one format.
 
-    Attributes
-    ----------
-    title : str
-    streams : mapping of str to tuple of parts
-        What it holds of each stream: units, axes, clock. A part that only some tables have is a
-        pair with the column that these have.
-    function : callable
-        Writes a file, or a folder, that does not exist.
-    reader : str or None
-        The key of `formats.READERS` that reads it; None if only other programs do.
-    endings : tuple of str
-        Endings of file names that mean this format; empty for folders.
-    alone : bool
-        Whether a file holds one stream only: the first of `streams` that there is.
+    `streams`: what it holds of each stream: units, axes, clock. A part that only some tables have
+    is a pair with the column that these have. `function`: writes a file, or a folder, that does not
+    exist. `reader`: the key of `formats.READERS` that reads it; None if only other programs do.
+    `endings`: endings of file names that mean this format; empty for folders. `alone`: whether a
+    file holds one stream only: the first of `streams` that there is.
     """
 
     title: str
@@ -324,19 +300,12 @@ def _write_geoparquet(path: Path, tables: Tables, options: FileOptions) -> list[
 
 
 def _write_npz(path: Path, tables: Tables, options: FileOptions) -> None:
-    said: dict[str, Array] = {}
-    arrays = _three_columns(tables)
-    if "imu" in tables:
-        stated = imu_columns(tables["imu"], None)[1]
-        said = {key: np.array(text) for key, text in stated.items()}
-    table_files.write_numpy(path, arrays | said)
+    said = {key: np.array(text) for key, text in _columns(tables)[1].items()}
+    table_files.write_numpy(path, _three_columns(tables) | said)
 
 
 def _write_mat(path: Path, tables: Tables, options: FileOptions) -> None:
-    said = {}
-    if "imu" in tables:
-        said = imu_columns(tables["imu"], None)[1]
-    hdf5.write_matlab(path, _three_columns(tables), said)
+    hdf5.write_matlab(path, _three_columns(tables), _columns(tables)[1])
 
 
 def _three_columns(tables: Tables) -> dict[str, Array]:
@@ -395,7 +364,7 @@ def _write_tum(path: Path, tables: Tables, options: FileOptions) -> list[Finding
         lat, lon, alt = (float(v) for v in first)
         place = {"lat": lat, "lon": lon, "alt": alt}
         source = track.attrs.get("source")
-        findings.append(Finding("io.written-origin", file=source, severity="note", data=place))
+        add_note(findings, "io.written-origin", file=source, data=place)
     return findings
 
 
@@ -413,7 +382,7 @@ def _write_map(path: Path, tables: Tables, options: FileOptions, write: Any) -> 
     if len(track) > options.most_points:
         data = {"most": options.most_points, "rows": len(track)}
         source = track.attrs.get("source")
-        findings.append(Finding("io.written-thinned", file=source, severity="note", data=data))
+        add_note(findings, "io.written-thinned", file=source, data=data)
     if stream == "reference":
         findings.append(not_held("a map", stream, "attitude and velocities", track))
     elif POSITION_SD[0] in _known_columns(track):

@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_note, check_choice
 from strapdown.formats.clocks import (
     GPS,
     GPS_EPOCH,
@@ -36,21 +36,6 @@ from strapdown.tables.checks import (
     height_words,
     values_of,
 )
-
-__all__ = [
-    "FLU",
-    "TUM_FRAMES",
-    "FileOptions",
-    "Tables",
-    "accel_needed",
-    "dates",
-    "dates_if_known",
-    "fixes_of",
-    "gps_ns",
-    "not_held",
-    "unix_ns",
-    "write_numbers",
-]
 
 #: Axes of a TUM file: name to (world axes, body axes).
 TUM_FRAMES = {
@@ -314,11 +299,7 @@ def imu_not_held(
     lost = [] if mark else mark_not_held(form, imu)
     if imu.attrs.get("sampling") == "mean":
         source = imu.attrs.get("source")
-        lost.append(
-            Finding(
-                "io.written-means", file=source, quantity="sampling", severity="note", form=form
-            )
-        )
+        add_note(lost, "io.written-means", file=source, quantity="sampling", form=form)
     if MAG[0] in imu.columns and not mag:
         lost.append(not_held(form, "imu", "the magnetic field", imu))
     return lost
@@ -418,11 +399,7 @@ def iso_dates(ns: Stamps) -> list[str]:
 
 
 def write_numbers(
-    path: Path,
-    columns: Sequence[NDArray[Any]],
-    head: str = "",
-    *,
-    separator: str = ",",
+    path: Path, columns: Sequence[NDArray[Any]], head: str = "", *, separator: str = ","
 ) -> None:
     """Write columns of numbers as lines, each with the fewest digits that reproduce it.
 

@@ -10,18 +10,6 @@ from typing import Any
 
 from strapdown.errors import DataError, StrapdownError
 
-__all__ = [
-    "damage",
-    "declared_most",
-    "library",
-    "memory_most",
-    "refuse_lie",
-    "refuse_total",
-    "seconds_most",
-    "size_of",
-    "text_most",
-]
-
 _MIB = 1 << 20
 #: Bytes that arrays of a file may have, unpacked: a share that any may have, and per stored byte.
 DECLARED, DECLARED_PER_BYTE = 256 * _MIB, 16

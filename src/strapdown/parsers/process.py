@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 if sys.platform == "linux":
     import fcntl
 
-__all__ = ["in_place", "parse", "start", "start_for"]
-
 #: Endings of files that are parsed elsewhere.
 ENDINGS = (
     *(".h5", ".hdf5", ".hdf", ".mat", ".npz", ".zip", ".xlsx", ".xlsm"),
@@ -96,31 +94,13 @@ def parse(
 ) -> Any:
     """Run a function on a file in the process that parses.
 
-    Parameters
-    ----------
-    function : str
-        ``module.name`` of this package, or ``package.module:name`` of another distribution, which
-        returns the like; its first parameter is the path.
-    path : Path
-        A file or folder, whose size sets the limits.
-    label : str
-        Name of the file in messages; by default that of `path`.
-    memory : int, bytes
-        Limit of memory instead of `limits.memory_most`.
-    room : callable, optional
-        Makes an array of a shape, of which columns of doubles that follow one another are rows.
-    **arguments
-        Further ones, of JSON.
-
-    Returns
-    -------
-    object
-        Dictionaries, lists, text, numbers and arrays; tuples have become lists.
-
-    Raises
-    ------
-    DataError
-        The function raised it; or it ended the process, took too much memory or time, or failed.
+    `function`: ``module.name`` of this package, or ``package.module:name`` of another distribution,
+    which returns the like; its first parameter is the path. `path`: a file or folder, whose size
+    sets the limits. `label`: name of the file in messages; by default that of `path`. `memory`
+    (bytes): limit of memory instead of `limits.memory_most`. `room`: makes an array of a shape, of
+    which columns of doubles that follow one another are rows. `**arguments`: further ones, of JSON.
+    Dictionaries, lists, text, numbers and arrays; tuples have become lists. DataError: the function
+    raised it; or it ended the process, took too much memory or time, or failed.
     """
     label = label or path.name
     if _in_place:

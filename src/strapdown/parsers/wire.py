@@ -18,8 +18,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["BrokenAnswerError", "decode", "encode"]
-
 #: Length of the JSON, and of all arrays together.
 _LENGTHS = struct.Struct("<QQ")
 #: Numbers, dates and texts of fixed width, whose bytes are all that they are.

@@ -20,8 +20,6 @@ from typing import Any
 from strapdown.errors import ConfigError, StrapdownError
 from strapdown.parsers import wire
 
-__all__ = ["MODULES", "call", "main"]
-
 #: Modules whose functions can be asked for.
 MODULES = ("hdf5", "matlab", "parquet", "archives", "workbooks", "recorders", "bags")
 

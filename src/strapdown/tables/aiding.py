@@ -45,16 +45,9 @@ LOWEST, HIGHEST = -2_000.0, 50_000.0
 def standard_height(pressure_pa: ArrayLike) -> Array:
     """Compute the height at which the standard atmosphere has a pressure.
 
-    Parameters
-    ----------
-    pressure_pa : array_like, (n,), Pa
-        22 632 (at 11 km of geopotential height) to 120 000.
-
-    Returns
-    -------
-    ndarray, (n,), m
-        Geometric, above mean sea level. ``H = T0 / L (1 - (p / p0)^(R L / g))``,
-        ``h = r H / (r - H)``: US Standard Atmosphere (1976), Eqs. (33a), (19).
+    `pressure_pa` ((n,), Pa): 22 632 (at 11 km of geopotential height) to 120 000. Returns (n,), m:
+    geometric, above mean sea level. ``H = T0 / L (1 - (p / p0)^(R L / g))``, ``h = r H / (r - H)``:
+    US Standard Atmosphere (1976), Eqs. (33a), (19).
     """
     ratio = np.asarray(pressure_pa, dtype=np.float64) / PRESSURE
     geopotential = TEMPERATURE / LAPSE * (1.0 - ratio**EXPONENT)
@@ -85,10 +78,6 @@ def barometer_table(
     source : str, optional
         Name for messages.
 
-    Returns
-    -------
-    DataFrame
-
     Raises
     ------
     DataError
@@ -113,10 +102,6 @@ def barometer_from_pressure(
     pressure_sd_pa : array_like, (n,) or float, Pa
     source : str, optional
         Name for messages.
-
-    Returns
-    -------
-    DataFrame
 
     Raises
     ------
@@ -177,10 +162,6 @@ def body_velocity_table(
     source : str, optional
         Name for messages.
 
-    Returns
-    -------
-    DataFrame
-
     Raises
     ------
     DataError
@@ -230,10 +211,6 @@ def heading_table(
         Standard deviation of the noise of each heading; infinite where not measured.
     source : str, optional
         Name for messages.
-
-    Returns
-    -------
-    DataFrame
 
     Raises
     ------
@@ -300,10 +277,6 @@ def odometer_table(
         Standard deviation of the noise, without the scale factor; infinite where not measured.
     source : str, optional
         Name for messages.
-
-    Returns
-    -------
-    DataFrame
 
     Raises
     ------

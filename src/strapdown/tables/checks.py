@@ -15,6 +15,10 @@ from strapdown.errors import DataError
 from strapdown.tables.on_disk import let_go, parts_of, step_range
 
 Array = NDArray[np.float64]
+# Upper limits of any rate and specific force; squares of larger ones soon overflow a double. A
+# shell is fired with 1e6 m/s².
+IMPOSSIBLE_RATE = 1e6  # rad/s
+IMPOSSIBLE_FORCE = 1e8  # m/s²
 
 
 def as_array(values: ArrayLike, columns: int | None, name: str, source: str | None = None) -> Array:
@@ -289,14 +293,8 @@ RELATIVE = "relative"
 class Gap:
     """A gap in a record.
 
-    Attributes
-    ----------
-    start, end : float, s
-        The stamps on either side.
-    usual : float, s
-        The usual step of the record.
-    sample : int
-        Index of the sample after the gap, from 0.
+    `start`, `end` (s): the stamps on either side. `usual` (s): the usual step of the record.
+    `sample`: index of the sample after the gap, from 0.
     """
 
     start: float

@@ -79,10 +79,6 @@ def gnss_table(
     source : str, optional
         Name for messages.
 
-    Returns
-    -------
-    DataFrame
-
     Raises
     ------
     DataError

@@ -181,10 +181,6 @@ def increments_table(
     dtheta : array_like, (n, 3), rad, optional
         Change of the body rate over the step times `dt`; zero if not given.
 
-    Returns
-    -------
-    DataFrame
-
     Raises
     ------
     DataError
@@ -232,10 +228,6 @@ def motion_increments_table(
         scrolling.
     source : str, optional
         Name for messages.
-
-    Returns
-    -------
-    DataFrame
 
     Raises
     ------

@@ -20,19 +20,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-__all__ = [
-    "LARGE",
-    "PART",
-    "filled",
-    "let_go",
-    "let_go_of_all",
-    "parts_of",
-    "room",
-    "step_range",
-    "stored",
-    "tidy",
-]
-
 #: Bytes from which on an array is in a file.
 LARGE = 1 << 22
 #: Bytes of an array that are used at a time.

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from strapdown.dsp.samples import moving_mean
 from strapdown.tables.checks import Gap, find_gaps
 
-__all__ = ["SampleClock", "ends_of_part", "sample_clock"]
-
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 
@@ -132,10 +130,6 @@ def sample_clock(stamps: Array, values: Array | None = None) -> SampleClock:
         A motion is smoother on the instants at which it was sampled than on any others: the values
         decide between scattered stamps and an even clock. Without them, or without motion,
         scattered stamps are left as they are.
-
-    Returns
-    -------
-    SampleClock
     """
     stamps = np.asarray(stamps, dtype=np.float64)
     gaps, in_bursts = _gaps(stamps)

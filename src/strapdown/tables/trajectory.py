@@ -54,10 +54,6 @@ def trajectory_table(
     source : str, optional
         Name for messages.
 
-    Returns
-    -------
-    DataFrame
-
     Raises
     ------
     DataError
@@ -215,10 +211,6 @@ def references_table(rows: Sequence[dict[str, object]], source: str | None = Non
         ``y``, ``z`` of the body, forward-right-down). ``sd`` in deg is the standard deviation.
     source : str, optional
         Name for messages.
-
-    Returns
-    -------
-    DataFrame
 
     Raises
     ------

@@ -22,7 +22,7 @@ from strapdown.errors import DataError
 from strapdown.formats import reader_of
 from strapdown.formats.arrays import nanoseconds_of
 from strapdown.formats.columns import read_name
-from strapdown.formats.nameless import rates_and_force
+from strapdown.formats.find_columns import rates_and_force
 from strapdown.formats.novatel import SCALES
 from strapdown.formats.vocabularies import FIXES, TRAJECTORIES
 from strapdown.tables import ACCEL, GYRO

@@ -436,7 +436,7 @@ def streams_of(path):
 
 
 def forget_what_was_read():
-    for cached in (hdf5_files._outline, hdf5_files._contents, toolboxes._names):
+    for cached in (hdf5_files.outline, hdf5_files.contents_of_matlab, toolboxes._names):
         cached.cache_clear()
     sensor_folder._names.cache_clear()
     sensor_folder._heads.cache_clear()

@@ -15,9 +15,6 @@ from strapdown.errors import Finding
 from strapdown.tables.on_disk import filled, let_go, stored
 from strapdown.units import TIME_UNITS
 
-__all__ = ["THRESHOLD", "Inference", "conclude", "differenced", "evidence", "posterior"]
-
-
 K = TypeVar("K", bound=Hashable)
 
 #: Below this probability the user is asked. A wrong unit spoils a whole run while a question costs
@@ -33,21 +30,12 @@ LEAST_SHARE = 0.005
 class Inference:
     """Inference of one quantity from the numbers of a log.
 
-    Attributes
-    ----------
-    quantity : str
-        ``time_unit``, ``time_faults``, ``rate``, ``accel_unit``, ``gravity``, ``accel_form``,
-        ``gyro_unit``, ``gyro_form``, ``gyro_axes``, ``up_axis``, ``accel_sign``, ``mag_unit``.
-    value : str, float or None
-        The most probable answer; None if no known one fits.
-    confidence : float
-        Its probability, 0 to 1.
-    evidence : tuple of Finding
-        The numbers that it is based on.
-    alternatives : tuple of (value, float)
-        The other answers with their probabilities, the most probable first.
-    flag : str
-        The option that answers the question; empty if there is none.
+    `quantity`: ``time_unit``, ``time_faults``, ``rate``, ``accel_unit``, ``gravity``,
+    ``accel_form``, ``gyro_unit``, ``gyro_form``, ``gyro_axes``, ``up_axis``, ``accel_sign``,
+    ``mag_unit``. `value`: the most probable answer; None if no known one fits. `confidence`: its
+    probability, 0 to 1. `evidence`: the numbers that it is based on. `alternatives`: the other
+    answers with their probabilities, the most probable first. `flag`: the option that answers the
+    question; empty if there is none.
     """
 
     quantity: str
@@ -166,18 +154,9 @@ COUNTER_BITS = (16, 24, 31, 32)
 class Steps:
     """Steps between the stamps of a log, in their unit; computed once for all questions.
 
-    Attributes
-    ----------
-    stamps : ndarray, (n,)
-        Finite, as in the log.
-    steps : ndarray, (n - 1,)
-    forward : ndarray
-        The positive ones.
-    mean : float
-        Of the forward steps within 50 times their median, as the clock may be set between; 0 if
-        time does not advance.
-    median : float
-        Of the forward steps; 0 if time does not advance.
+    `stamps` ((n,)): finite, as in the log. `steps` ((n - 1,)). `forward`: the positive ones.
+    `mean`: of the forward steps within 50 times their median, as the clock may be set between; 0 if
+    time does not advance. `median`: of the forward steps; 0 if time does not advance.
     """
 
     stamps: NDArray[Any]
@@ -399,40 +378,29 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
     lasting = 0.01 if direction > 0.7 and len(norms) > 20 else 1.0
     # With gravity the motion of a hand or a car spreads the norm by a tenth.
     calm = float(np.exp(-spread / 0.12)) if len(norms) >= 5 else 0.1
-    weights: dict[tuple[str | None, str], float] = {}
-
-    def add(unit: str | None, form: str, prior: float, density: float) -> None:
-        weights[unit, form] = float(np.log(max(prior * density, 1e-300)))
-
+    # Prior and density of the norm, by unit and form.
+    models: dict[tuple[str | None, str], tuple[float, float]] = {}
     for unit, scale in SCALES.items():
         prior = _GRAVITY_PRIOR[unit] * (_WHOLE[unit] if whole else 1.0)
         off = (where - np.log10(STANDARD_GRAVITY / scale)) / sd
         # A cubic tail, for sensors that shake and turn more than the median spread shows.
         peak = 0.45 / sd / (1.0 + off * off / 3.0) ** 2
-        add(unit, "rate", prior * _PRIOR_FORM["rate"], calm * peak)
+        models[unit, "rate"] = prior * _PRIOR_FORM["rate"], calm * peak
         si = usual * scale
         broad = 0.25 * min(1.0, 10.0 / si) ** 2 * min(1.0, si / 1e-3)
         offset = broad * min(1.0, 0.3 / si) ** 3  # constant offset other than gravity
-        add(
-            unit,
-            "linear",
-            prior * _PRIOR_FORM["linear"],
-            swings * lasting * broad + (1.0 - swings) * offset,
-        )
+        still = swings * lasting * broad + (1.0 - swings) * offset
+        models[unit, "linear"] = prior * _PRIOR_FORM["linear"], still
         if step:
             off = (where - np.log10(STANDARD_GRAVITY * step / scale)) / sd
-            add(
-                unit,
-                "increment",
-                prior * _PRIOR_FORM["increment"],
-                calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2,
-            )
+            peak = calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2
+            models[unit, "increment"] = prior * _PRIOR_FORM["increment"], peak
     for k, count in enumerate(_COUNTS):
         off = (where - np.log10(count)) / sd
         prior = _PRIOR_COUNTS / len(_COUNTS) * (1.0 if whole else _BROKEN_COUNTS)
-        add(None, f"counts {k}", prior, calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2)
-    add(None, "other", _PRIOR_FORM["other"], (calm + swings) / _DECADES)
-    found = posterior(weights)
+        models[None, f"counts {k}"] = prior, calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2
+    models[None, "other"] = _PRIOR_FORM["other"], (calm + swings) / _DECADES
+    found = posterior({key: float(np.log(max(p * d, 1e-300))) for key, (p, d) in models.items()})
     units, forms = marginal(found, 0), marginal(found, 1)
     counted = math.fsum(p for f, p in forms.items() if str(f).startswith("counts"))
     forms["rate"] = forms.get("rate", 0.0) + counted

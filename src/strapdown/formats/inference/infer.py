@@ -48,14 +48,8 @@ HUGE, FAR = 1e12, 1e25
 class Signals:
     """Raw numbers of a log, without units.
 
-    Attributes
-    ----------
-    stamps : ndarray, (n,), or None
-    gyro, accel, mag : ndarray, (n, 3), or None
-    time_unit : str or None
-        If known.
-    rate : float or None, Hz
-        Without stamps.
+    `stamps` ((n,)). `gyro`, `accel`, `mag` ((n, 3)). `time_unit`: if known. `rate` (Hz): without
+    stamps.
     """
 
     stamps: NDArray[Any] | None
@@ -295,14 +289,9 @@ ARM_IN_STEP = 0.97
 class Arm:
     """Fraction of a force's mean square that a lever arm explains.
 
-    Attributes
-    ----------
-    alone : float
-        Of the whole force, for a model that is zero without rotation (gravity-free).
-    in_step : float
-        Of its variation about the mean.
-    frequency : float, rad/s
-        Root mean square of the angular acceleration over that of the rate.
+    `alone`: of the whole force, for a model that is zero without rotation (gravity-free).
+    `in_step`: of its variation about the mean. `frequency` (rad/s): root mean square of the angular
+    acceleration over that of the rate.
     """
 
     alone: float

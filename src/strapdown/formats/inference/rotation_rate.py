@@ -280,9 +280,7 @@ def _written_step(gyro: Array) -> tuple[float, float]:
 
 
 def _evidence(
-    largest: float,
-    scales: list[tuple[Turn, float]],
-    total: dict[Hypothesis, float],
+    largest: float, scales: list[tuple[Turn, float]], total: dict[Hypothesis, float]
 ) -> tuple[Finding, ...]:
     unit = next(iter(marginal(total, 0)))
     told = []
@@ -374,17 +372,11 @@ def signed_permutations() -> tuple[tuple[str, ...], Array]:
 class Turn:
     """Sums of one time scale, from which every hypothesis is evaluated.
 
-    Attributes
-    ----------
-    half_width : float, s
-    windows : int
-        Number of windows without overlap.
-    gram : ndarray, (10, 10)
-        For the nine elements of k M (row by row) and the change of gravity, with the bias
-        eliminated; gravity has norm 1.
-    still_rates, still_force : ndarray, (m, 3)
-        Integral of the gyro over each window in which gravity stands still, weighted, in its unit
-        times s, and the direction of the force there; empty if these are few.
+    `half_width` (s). `windows`: number of windows without overlap. `gram` ((10, 10)): for the nine
+    elements of k M (row by row) and the change of gravity, with the bias eliminated; gravity has
+    norm 1. `still_rates`, `still_force` ((m, 3)): integral of the gyro over each window in which
+    gravity stands still, weighted, in its unit times s, and the direction of the force there; empty
+    if these are few.
     """
 
     half_width: float
