@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -254,6 +255,7 @@ def read_imu(
     ConfigError
         The file does not exist, or an option does not fit it.
     """
+    _require_path(path)
     unknown = set(units or {}) - {"gyro", "accel", "time"}
     if unknown:
         raise ConfigError("api.quantity-without-unit", quantity="units", unknown=sorted(unknown)[0])
@@ -335,7 +337,14 @@ def read_gnss(
     return _gnss(path, options)
 
 
+def _require_path(path: Any) -> None:
+    """Refuse what is no path, as a table, which needs no reading."""
+    if not isinstance(path, str | os.PathLike):
+        raise ConfigError("api.table-for-path", quantity="path", kind=type(path).__name__)
+
+
 def _gnss(path: str | Path, options: GnssOptions) -> GnssFixes:
+    _require_path(path)
     table = read_gnss_table(path, options)
     fixes = GnssFixes(table)
     fixes.attrs = dict(table.attrs)
@@ -367,6 +376,8 @@ def read(path: str | Path, **options: Any) -> Streams:
     """
     from strapdown.formats.trajectory_readers import read_trajectory
     from strapdown.tables import attitude_table
+
+    _require_path(path)
 
     def fixes(path: str | Path) -> pd.DataFrame:
         return _gnss(path, GnssOptions(unstated_position_sd=math.inf))

@@ -245,6 +245,7 @@ READERS: dict[str, Reader] = {
     "csv": Reader("text table (.csv .txt .tsv .dat)", csv.detect, {TABLE: csv.read}),
     "python-ins": Reader.of(toolboxes, "python-ins arrays: imu, fix, truth (.npz)", "python_ins"),
     "sbet": Reader.of(receivers, name="sbet"),
+    "npy": Reader.of(table_files, "NumPy array (.npy)", "numpy_array"),
     "npz": Reader.of(table_files, "NumPy archive (.npz)", "numpy"),
     "parquet": Reader(
         "Parquet (.parquet .pq)", table_files.detect_parquet, {TABLE: table_files.read_parquet}

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding, add_note
@@ -79,8 +80,8 @@ def _text_of_excel(cell: Any) -> str:
 
 JSON_SUFFIXES = (".json", ".jsonl", ".ndjson", ".jsonlines", ".ldjson")
 KINDS = ("sensor", "type", "name", "kind", "sensorType", "sensor_type")
-#: Deepest nesting that is unfolded.
-DEEP = 6
+#: Deepest nesting that is unfolded, and most parts of a list.
+DEEP, PARTS = 6, 16
 
 
 #: A list of sensors before the list of their values, as Edge Impulse has them (data acquisition
@@ -88,6 +89,13 @@ DEEP = 6
 _APART = re.compile(r'"sensors"\s*:\s*\[\s*\{[^\[\]]*\}\s*\]\s*,\s*"values"\s*:\s*\[')
 #: An object of which one member is the list of the objects: ``{"locations": [{…``.
 _MEMBER = re.compile(r'\{\s*(?:"\w+"\s*:\s*(?:"[^"]*"|[-\w.]+)\s*,\s*)*"\w+"\s*:\s*\[\s*\{')
+
+
+#: An object whose members are columns: ``{"time": [0.0, …``, or as pandas writes a table.
+_BY_COLUMNS = re.compile(
+    r'\{\s*(?:"[^"]*"\s*:\s*(?:"[^"]*"|-?[\d.eE+]+)\s*,\s*)*'
+    r'"[^"]*"\s*:\s*(?:\[\s*(?:\[\s*)?["\d-]|\{\s*"0"\s*:)'
+)
 
 
 def _is_object(line: str) -> bool:
@@ -102,7 +110,7 @@ def _begins(path: Path) -> bool:
     text = head(path).lstrip()
     if path.suffix.lower() in JSON_SUFFIXES[:1] and text.startswith("["):
         return text[1:].lstrip().startswith("{")
-    if _APART.search(text) or _MEMBER.match(text):
+    if _APART.search(text) or _MEMBER.match(text) or _is_by_columns(text):
         return True
     return _is_object(text.partition("\n")[0])
 
@@ -114,6 +122,8 @@ def read_json_table(path: Path) -> RawLog:
     """Read the members of the objects as columns, missing ones as NaN."""
     if _APART.search(head(path)):
         return _names_apart(path)
+    if _is_by_columns(head(path).lstrip()):
+        return _by_columns(path)
     objects, rows, findings = _objects(path)
     kind = next(
         (k for k in KINDS if len({kind_of(str(o.get(k))) for o in objects} - {None}) > 1), None
@@ -135,6 +145,59 @@ def read_json_table(path: Path) -> RawLog:
             )
     raw = RawLog(path.name, (path,), columns, rows=np.array(rows), findings=findings)
     return with_force_summed(raw)
+
+
+def _is_by_columns(text: str) -> bool:
+    """Whether the beginning of a text is that of one object of columns.
+
+    Of lines of objects, a list is of the parts of a vector: one object of a line alone has longer
+    ones, or numbers its samples.
+    """
+    if _BY_COLUMNS.match(text) is None or _MEMBER.match(text):
+        return False
+    first, _, rest = text.partition("\n")
+    try:
+        one = json.loads(first)
+    except (ValueError, RecursionError):
+        return True
+    return not rest.strip() and any(
+        (isinstance(v, list) and len(v) > PARTS) or (isinstance(v, dict) and "0" in v)
+        for v in one.values()
+    )
+
+
+def _by_columns(path: Path) -> RawLog:
+    """Read the lists of an object as columns, and ``columns`` and ``data`` as pandas writes them.
+
+    DataError: it is no object, or has no numbers.
+    """
+    content = from_json(path)
+    held = content if isinstance(content, dict) else {}
+    if isinstance(held.get("columns"), list) and isinstance(held.get("data"), list):
+        rows = [row for row in held["data"] if isinstance(row, list)]
+        held = {str(n): [row[k] for row in rows] for k, n in enumerate(held["columns"])}
+    arrays: dict[str, NDArray[Any]] = {}
+    meta: dict[str, Any] = {}
+    for name, values in held.items():
+        given = list(values.values()) if isinstance(values, dict) else values
+        if not isinstance(given, list):
+            meta[str(name)] = given
+            continue
+        try:
+            array = np.array(given, dtype=None if all(type(v) is int for v in given) else float)
+        except (TypeError, ValueError):
+            array = _dates_of(given)
+        arrays[str(name)] = array
+    return with_force_summed(raw_log(path, arrays, {}, meta))
+
+
+def _dates_of(values: list[Any]) -> NDArray[Any]:
+    """Return texts of ISO 8601 as dates of UTC; other values as they are, which nothing reads."""
+    try:
+        dates = pd.to_datetime(pd.Series(values), format="ISO8601", utc=True)
+        return dates.dt.tz_localize(None).to_numpy()
+    except (TypeError, ValueError):
+        return np.array([str(v) for v in values], dtype=object)
 
 
 def _names_apart(path: Path) -> RawLog:
@@ -198,7 +261,7 @@ def _unfolded(value: Any, name: str = "", depth: int = 0) -> dict[str, Any]:
     if isinstance(value, dict):
         parts = [(f"{name}.{k}" if name else str(k), v) for k, v in value.items()]
     elif isinstance(value, list):
-        parts = [(f"{name}[{k}]", v) for k, v in enumerate(value[:16])]
+        parts = [(f"{name}[{k}]", v) for k, v in enumerate(value[:PARTS])]
     else:
         plain = value if value is None or isinstance(value, str | int | float) else None
         return {name: plain}
@@ -322,6 +385,23 @@ def load_numpy(path: Path, label: str) -> NDArray[Any]:
 # Folders of NumPy arrays, one per quantity: ``time.npy``, ``gyro_rad_s.npy``, ``accel.npy``.
 
 
+detect_numpy_array = Signs(named=(".npy",))
+
+
+def read_numpy_array_table(path: Path) -> RawLog:
+    """Read one array: its fields as columns, or columns without names.
+
+    DataError: the file is damaged, or the array has neither fields nor two dimensions.
+    """
+    array = np.squeeze(load_numpy(path, path.name))
+    if array.dtype.names:
+        return raw_log(path, {name: array[name] for name in array.dtype.names}, {}, {})
+    if array.ndim != 2:
+        raise DataError("io.no-array-of-numbers", file=path.name, arrays=path.stem)
+    rows = array if array.shape[0] >= array.shape[1] else array.T
+    return raw_log(path, {f"column {k + 1}": rows[:, k] for k in range(rows.shape[1])}, {}, {})
+
+
 detect_numpy_folder = Signs(
     folder=lambda path: any(
         str(read_name(p.stem).quantity).startswith("gyro") for p in _arrays(path)
@@ -349,14 +429,15 @@ def _arrays(path: Path) -> list[Path]:
     return sorted(p for p in path.glob("*.npy") if p.is_file()) if path.is_dir() else []
 
 
-# Parquet tables: columns, lists of three, structures; units where stated in fields.
+# Parquet and Feather tables: columns, lists of three, structures; units where stated in fields.
 
 
 PARQUET_SUFFIXES = (".parquet", ".pq", ".geoparquet")
 PARQUET_MAGIC = b"PAR1"
+FEATHER = ".feather"
 
 
-detect_parquet = Signs(named=PARQUET_SUFFIXES, first=rb"\A" + re.escape(PARQUET_MAGIC))
+detect_parquet = Signs(named=(*PARQUET_SUFFIXES, FEATHER), first=rb"\APAR1|\AARROW1")
 
 
 def read_parquet(path: Path) -> RawLog:

@@ -25,6 +25,9 @@ def table(path: Path) -> dict[str, Any]:
     DataError: the file is damaged, or declares far more data than it holds.
     """
     try:
+        with path.open("rb") as begin:
+            if begin.read(6) == b"ARROW1":
+                return _of_feather(path)
         # Otherwise all of the file is in memory before the first number is decoded.
         with pq.ParquetFile(path, pre_buffer=False, buffer_size=BUFFER) as file:
             rows, width = file.metadata.num_rows, max(file.metadata.num_columns, 1)
@@ -35,16 +38,9 @@ def table(path: Path) -> dict[str, Any]:
                     "io.too-many-columns-of-table", file=path.name, count=width, most=MOST_COLUMNS
                 )
             schema, numbers = file.schema_arrow, _numbers(file, rows)
-            held = file.read(use_threads=False) if numbers is None else None
-        arrays: dict[str, np.ndarray[Any, Any] | None] = {**(numbers or {})}
-        if held is not None:
-            while any(pa.types.is_struct(field.type) for field in held.schema):
-                held = held.flatten()
-            schema = held.schema
-            # Column by column, so that at most one is in memory twice.
-            for name in held.column_names:
-                arrays[name] = _array(held.column(0))
-                held = held.remove_column(0)
+            found = {**(numbers or {})}
+            if numbers is None:
+                schema, found = _arrays(file.read(use_threads=False))
         meta = {_text(k): _text(v) for k, v in (schema.metadata or {}).items()}
         units = _units(schema)
         pa.default_memory_pool().release_unused()
@@ -56,8 +52,38 @@ def table(path: Path) -> dict[str, Any]:
             file=path.name,
             splitlines=str(error).splitlines()[0] if str(error) else "damaged",
         ) from None
-    found = {name: array for name, array in arrays.items() if array is not None}
     return {"arrays": found, "units": units, "meta": meta}
+
+
+def _arrays(held: pa.Table) -> tuple[pa.Schema, dict[str, np.ndarray[Any, Any]]]:
+    """Return the schema of a table without structures, and its columns that are arrays."""
+    while any(pa.types.is_struct(field.type) for field in held.schema):
+        held = held.flatten()
+    schema = held.schema
+    found = {}
+    # Column by column, so that at most one is in memory twice.
+    for name in held.column_names:
+        array = _array(held.column(0))
+        held = held.remove_column(0)
+        if array is not None:
+            found[name] = array
+    return schema, found
+
+
+def _of_feather(path: Path) -> dict[str, Any]:
+    """Read a table of Feather, version 2: a file of Arrow."""
+    with pa.OSFile(str(path)) as source:
+        reader = pa.ipc.open_file(source)
+        if len(reader.schema) > MOST_COLUMNS:
+            raise DataError(
+                "io.too-many-columns-of-table",
+                file=path.name,
+                count=len(reader.schema),
+                most=MOST_COLUMNS,
+            )
+        schema, arrays = _arrays(reader.read_all())
+    meta = {_text(k): _text(v) for k, v in (schema.metadata or {}).items()}
+    return {"arrays": arrays, "units": _units(schema), "meta": meta}
 
 
 def with_bytes(path: Path) -> dict[str, Any]:

@@ -341,3 +341,10 @@ def test_arrays_in_other_units_are_doubted(algorithm, clock, unit, code):
     codes = {f.code for f in out.attrs["findings"]}
     wrong = {"attitude.turn-between-samples", "attitude.rate-implausible"}
     assert codes & wrong == ({code} if code else set())
+
+
+def test_a_table_in_place_of_a_path_is_said_to_need_no_reading():
+    table = pd.DataFrame({"gyro_x": [0.0]})
+    for read in (sd.read_imu, sd.read_gnss, sd.read):
+        with pytest.raises(ConfigError, check=coded("api.table-for-path", kind="DataFrame")):
+            read(table)

@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 from tests.coded import coded
@@ -1130,3 +1131,52 @@ def test_names_between_commas_over_rows_between_blanks(tmp_path):
     expected = [55.7, 37.6, 160.0, 4.0, 3.0, 0.5, 1.0, -2.0, 33.0]
     np.testing.assert_array_equal(got.to_numpy()[4], expected)
     np.testing.assert_array_equal(got.index, 300000.0 + np.arange(9))
+
+
+def frame(count=40):
+    names = [*(f"gyro_{a}_dps" for a in "xyz"), *(f"accel_{a}_g" for a in "xyz")]
+    values = np.array([[float(v) for v in row.split(",")] for row in rows(count)])
+    table = pd.DataFrame(values[:, 1:], columns=names)
+    table.insert(0, "time_s", values[:, 0])
+    return table
+
+
+@pytest.mark.parametrize("kind", ["columns", "lists", "split", "dates", "rows"])
+def test_json_of_columns(tmp_path, kind):
+    table, path = frame(), tmp_path / "log.json"
+    if kind == "dates":
+        dates = pd.to_datetime(table.pop("time_s"), unit="s", origin="2024-05-06")
+        table.insert(0, "time", [f"{d.isoformat(timespec='milliseconds')}Z" for d in dates])
+    if kind in ("lists", "dates"):
+        path.write_text(json.dumps({"device": "x"} | table.to_dict("list"), indent=1))
+    else:
+        table.to_json(path, orient={"rows": "records"}.get(kind, kind), double_precision=15)
+    check(read_log(path))
+
+
+def test_json_of_vectors(tmp_path):
+    table, path = frame(), tmp_path / "log.json"
+    content = {"t": table["time_s"].tolist()}
+    content["gyro"] = table.iloc[:, 1:4].to_numpy().tolist()
+    content["accel"] = table.iloc[:, 4:].to_numpy().tolist()
+    path.write_text(json.dumps(content))
+    check(read_log(path, ReadOptions(gyro_unit="deg/s", accel_unit="g", time_unit="s")))
+
+
+def test_an_array_and_a_table_of_feather(tmp_path):
+    table = frame()
+    table.to_feather(tmp_path / "log.feather")
+    check(read_log(tmp_path / "log.feather"))
+    np.save(tmp_path / "named.npy", table.to_records(index=False))
+    check(read_log(tmp_path / "named.npy"))
+    stated = {q: str(k) for k, q in enumerate(["time", *GYRO, *ACCEL], 1)}
+    options = ReadOptions(columns=stated, gyro_unit="deg/s", accel_unit="g", time_unit="s")
+    for name, array in (("rows", table.to_numpy()), ("across", table.to_numpy().T)):
+        np.save(tmp_path / f"{name}.npy", array)
+        with pytest.raises(DataError) as asked:
+            read_log(tmp_path / f"{name}.npy")
+        assert dict(asked.value.finding.data["answers"]).items() >= stated.items()
+        check(read_log(tmp_path / f"{name}.npy", options))
+    np.save(tmp_path / "one.npy", table["time_s"].to_numpy())
+    with pytest.raises(DataError, check=coded("io.no-array-of-numbers")):
+        read_log(tmp_path / "one.npy")
