@@ -33,7 +33,7 @@ OWN_NEAREST = {"attitude.hz-asked-hz"}
 #: Functions that append a finding to their first argument; its code is the second.
 APPENDED = {"add_note", "add_warning"}
 RAISED = {"Finding", "DataError", "ConfigError", "DivergenceError", "check_choice", *APPENDED}
-#: Methods of the readers that add the location to a code and data.
+#: Methods of logs, headers and channels that add no more than the location to a code and data.
 LOCATED = {"fault", "_fault", "note", "warn"}
 
 
@@ -53,7 +53,8 @@ def raised(nodes):
         (path, node)
         for path, inside in nodes.items()
         for node in inside
-        if isinstance(node, ast.Call) and node.args and _name(node) in RAISED
+        if isinstance(node, ast.Call) and node.args
+        if _name(node) in (RAISED | LOCATED if isinstance(node.func, ast.Attribute) else RAISED)
     ]
 
 

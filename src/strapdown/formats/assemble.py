@@ -334,13 +334,24 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
         if {read_name(n).quantity for n in forces} == set(ACCEL):
             named = {read_name(n).quantity: n for n in reversed(forces)}
             likely = _as_accelerometer(raw, [named[q] for q in ACCEL])
-            code = "io.accelerometer-not-read"
-            add_warning(out, code, file=raw.name, quantity="accel", names=forces, **likely)
+            add_warning(
+                out,
+                "io.accelerometer-not-read",
+                file=raw.name,
+                quantity="accel",
+                names=forces,
+                **likely,
+            )
         elif not forces:
             for three, norm in steady_triads(raw, names):
                 data = {"names": three, "norm": norm, **_as_accelerometer(raw, three)}
-                code = "io.columns-like-accelerometer"
-                add_warning(out, code, file=raw.name, quantity="accel", data=data)
+                add_warning(
+                    out,
+                    "io.columns-like-accelerometer",
+                    file=raw.name,
+                    quantity="accel",
+                    data=data,
+                )
     return out
 
 

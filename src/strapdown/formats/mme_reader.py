@@ -413,9 +413,13 @@ def stamps_of(
     def even(count: int) -> Array:
         interval = header.number("sampling interval")
         if interval is None or not interval > 0.0:
-            missing = "io.sampling-interval-not-stated"
-            code = missing if interval is None else "io.sampling-interval-none"
-            raise header.fault(code, "sampling interval", interval=interval)
+            raise header.fault(
+                "io.sampling-interval-not-stated"
+                if interval is None
+                else "io.sampling-interval-none",
+                "sampling interval",
+                interval=interval,
+            )
         first = "0"
         if header.number("time of first sample") is not None:
             first = header.text("time of first sample").split()[0]

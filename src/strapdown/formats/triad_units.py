@@ -434,7 +434,7 @@ def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]
         data: dict[str, Any] = {"file": log.raw.name, "quantity": triad, "triad": triad}
         data["unit"] = unit
         if triad == "gyro" and not other.settled and (instead := _instead(unit, other)):
-            fault = Finding(code, **data, likely=instead, reason=other.finding())
+            fault = Finding("io.contradicts-unit", **data, likely=instead, reason=other.finding())
             log.questions.ask(fault, gyro_unit=instead)
         if not other.settled:
             continue
@@ -472,8 +472,12 @@ def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]
     # Left-handed axes that the user states turn the sense of rotation.
     if reversed_sense and stated is not None and mirrored(*parse_axes(stated)):
         return
-    code = "io.gyro-turns-against-gravity" if reversed_sense else "io.gyro-axes-differ"
-    log.warn(code, "gyro", axes=axes.value, reason=axes.finding())
+    log.warn(
+        "io.gyro-turns-against-gravity" if reversed_sense else "io.gyro-axes-differ",
+        "gyro",
+        axes=axes.value,
+        reason=axes.finding(),
+    )
 
 
 def _instead(unit: str, inferred: Inference) -> str | None:
@@ -572,8 +576,12 @@ def sampling_of(log: LogInUse, units: dict[str, tuple[str, str]]) -> str:
                 names=names,
             )
         rest = [t for t in plain if t not in names]
-        code = "io.increments-made-means-with-rates" if rest else "io.increments-made-means"
-        log.note(code, "sampling", names=names, rest=rest)
+        log.note(
+            "io.increments-made-means-with-rates" if rest else "io.increments-made-means",
+            "sampling",
+            names=names,
+            rest=rest,
+        )
         return "mean"
     if not (asked := asked or (log.raw.sampling or "").lower()):
         log.note("io.sampling-taken-as-instantaneous", "sampling")
