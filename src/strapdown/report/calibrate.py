@@ -201,8 +201,8 @@ def effect_table(result: CalibrateRun) -> TableBlock | None:
         if before.size:
             values = [factor * math.sqrt(float(np.mean(v**2))) for v in (before, after)]
             rows.append((title, unit, *(f"{v:.3g}" for v in values)))
-    before, after = (float(np.square(still[n].to_numpy(np.float64)).sum()) for n in RESIDUALS[0][3])
-    caption = FEW_POSES if after > before else ""
+    was, left = (float(np.square(still[n].to_numpy(np.float64)).sum()) for n in RESIDUALS[0][3])
+    caption = FEW_POSES if left > was else ""
     return table_of("Root mean square | unit | before | after", rows, caption, text=(0, 1))
 
 
@@ -299,14 +299,15 @@ def poses_chart(result: CalibrateRun) -> Chart | None:
     if found is None or still is None:
         return None
     places = np.array([_map(u) for u in still[["up_x", "up_y", "up_z"]].to_numpy()]).reshape(-1, 2)
-    lines = [dots("rest", *places.T, AXIS_COLOURS[0], size=6.0)]
+    lines = [dots("rest", places[:, 0], places[:, 1], AXIS_COLOURS[0], size=6.0)]
     if missing := [r for r in found.remedies if not r.startswith("turn")]:
         ups = [
             np.array([float(f"{s}1") if (s := _sign(r, a)) else 0.0 for a in XYZ]) for r in missing
         ]
         at = np.array([_map(u / np.linalg.norm(u)) for u in ups])
         labels = tuple(f"{r} up" for r in missing)
-        lines.append(dots("missing", *at.T, AXIS_COLOURS[1], hollow=True, labels=labels))
+        points = dots("missing", at[:, 0], at[:, 1], AXIS_COLOURS[1], hollow=True, labels=labels)
+        lines.append(points)
     panel = Panel("elevation of up above the xy plane, deg", tuple(lines))
     return Chart("poses", "What was up", "", "azimuth of up from x to y, deg", (panel,))
 
