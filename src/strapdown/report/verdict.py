@@ -264,7 +264,7 @@ def repeated_words(result: NavigationRun) -> str:
         failed = "" if repeated.failed is None else repeated.failed.text()
         return f"Re-run {repeated.change.what}, the run fails: {failed}"
     table = repeated.differences
-    place, turn = _apart(table)
+    place, turn = apart(table)
     before, after = len(trust.inconsistencies), len(repeated.left)
     rest = "the remaining measurements are no more consistent"
     if not after:
@@ -291,7 +291,7 @@ def repeated_words(result: NavigationRun) -> str:
     )
 
 
-def _apart(differences: pd.DataFrame) -> tuple[Array, Array]:
+def apart(differences: pd.DataFrame) -> tuple[Array, Array]:
     """Distances in m and angles in deg of a run from its re-run."""
     north, east, heading = (
         differences[c].to_numpy(dtype=np.float64) for c in ("north", "east", "heading")
@@ -567,7 +567,7 @@ def repeated_chart(result: NavigationRun) -> Chart | None:
     time = index_of(repeated.differences)
     if len(time) < 2:
         return None
-    place, turn = _apart(repeated.differences)
+    place, turn = apart(repeated.differences)
     panels = []
     for label, difference in (("position, m", place), ("heading, deg", turn)):
         lines = []
