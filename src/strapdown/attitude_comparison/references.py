@@ -148,9 +148,9 @@ def gather_references(
             raise ConfigError("attitude.no-rest", file=source.name, quantity=asks)
         tilts = tilt_references(usable, levelled_from=usable[0] if levelled else None)
         if tilts.empty:
-            span = {"start": usable[0].start, "end": usable[0].end}
+            rest = {"start": usable[0].start, "end": usable[0].end}
             findings.append(
-                Finding("attitude.one-rest", file=source.name, quantity=asks, data=span)
+                Finding("attitude.one-rest", file=source.name, quantity=asks, data=rest)
             )
         points = pd.concat([points, tilts], ignore_index=True) if len(points) else tilts
     return points, positions, same_pose_candidates(usable) if points.empty else ()
