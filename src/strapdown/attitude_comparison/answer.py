@@ -144,21 +144,16 @@ def find_answer(evidence: Evidence, tolerance_deg: float) -> Answer:
 
     If none passes, the sentence states whether the sensor or the rate is the limit.
     """
-    answer = _judged(evidence, tolerance_deg)
+    if passing := choices(evidence, "error_deg", tolerance_deg):
+        answer = _enough(evidence, passing, tolerance_deg)
+    else:
+        full = evidence.sweep[evidence.sweep["factor"] == 1]
+        # By algorithm error: a poor algorithm may end nearer to the truth by chance.
+        best = full.iloc[int(full["own_deg"].to_numpy().argmin())]
+        sensor = _sensor_error(evidence, best)
+        limited = _limited_by_sensor if sensor > tolerance_deg else _limited_by_rate
+        answer = limited(evidence, best, sensor, tolerance_deg)
     return answer if evidence.known else replace(answer, helps=(HOW_TO_REFERENCE, *answer.helps))
-
-
-def _judged(evidence: Evidence, tolerance_deg: float) -> Answer:
-    passing = choices(evidence, "error_deg", tolerance_deg)
-    if passing:
-        return _enough(evidence, passing, tolerance_deg)
-    full = evidence.sweep[evidence.sweep["factor"] == 1]
-    # By algorithm error: a poor algorithm may end nearer to the truth by chance.
-    best = full.iloc[int(full["own_deg"].to_numpy().argmin())]
-    sensor = _sensor_error(evidence, best)
-    if sensor > tolerance_deg:
-        return _limited_by_sensor(evidence, best, sensor, tolerance_deg)
-    return _limited_by_rate(evidence, best, sensor, tolerance_deg)
 
 
 def choices(evidence: Evidence, column: str, limit: float, meaning: str = "sum") -> list[Choice]:
@@ -223,13 +218,11 @@ def _enough(evidence: Evidence, passing: list[Choice], tolerance: float) -> Answ
         "enough" if evidence.known else "own",
         sentence,
         tolerance,
-        chosen.cost.algorithm,
-        chosen.meaning,
-        chosen.rate_hz,
-        tuple(why),
-        (),
-        dropped_hz,
-        evidence.holding,
+        *(chosen.cost.algorithm, chosen.meaning, chosen.rate_hz),
+        why=tuple(why),
+        helps=(),
+        dropped_hz=dropped_hz,
+        holding=evidence.holding,
     )
 
 
@@ -286,8 +279,16 @@ def _limited_by_sensor(
         )
     sentence = f"No algorithm stays within {tolerance:g}°, and none could: {whose}."
     algorithm = meaning = rate = dropped_hz = None
-    if (holding := _of_holding(evidence, tolerance)) is not None:
-        sentence += f" {holding}"
+    if (holding := evidence.holding) is not None:
+        sentence += f" From a known attitude, integration alone holds {tolerance:g}° for "
+        if holding.ends:
+            over = "" if holding.median_ends else "more than "
+            sentence += (
+                f"{holding.shortest_s:.3g} s at least, and from half of the instants for "
+                f"{over}{holding.median_s:.3g} s."
+            )
+        else:
+            sentence += f"as long as the reference covers: {holding.shortest_s:.3g} s."
     why = [
         f"The most accurate algorithm here, {best['algorithm']} at {float(best['rate_hz']):.4g} "
         f"Hz, is {_deg(float(best['error_deg']))} off; its own part is "
@@ -337,23 +338,6 @@ def _limited_by_sensor(
     )
 
 
-def _of_holding(evidence: Evidence, tolerance: float) -> str | None:
-    holding = evidence.holding
-    if holding is None:
-        return None
-    if not holding.ends:
-        return (
-            f"From a known attitude, integration alone holds {tolerance:g}° for as long as the "
-            f"reference covers: {holding.shortest_s:.3g} s."
-        )
-    over = "" if holding.median_ends else "more than "
-    return (
-        f"From a known attitude, integration alone holds {tolerance:g}° for "
-        f"{holding.shortest_s:.3g} s at least, and from half of the instants for "
-        f"{over}{holding.median_s:.3g} s."
-    )
-
-
 #: Sensors that a filter uses beside the gyro.
 _AIDS = {
     "gyro+accel": "the accelerometer",
@@ -363,8 +347,7 @@ _AIDS = {
 
 def _filter_enough(evidence: Evidence, tolerance: float) -> str | None:
     """Say which filter suffices: the cheapest within the tolerance, or in roll and pitch."""
-    whole = [run for run in evidence.filters if _largest(run) <= tolerance]
-    if whole:
+    if whole := [run for run in evidence.filters if _largest(run) <= tolerance]:
         run = min(whole, key=_thrift)
         rate = "" if run.lowest_hz is None else f" down to {run.lowest_hz:.4g} Hz"
         return (
@@ -372,19 +355,18 @@ def _filter_enough(evidence: Evidence, tolerance: float) -> str | None:
             f"at the log's own rate its largest error is {_deg(_largest(run))}."
         )
     level = [
-        run
+        (run, run.errors.most_inclination_deg)
         for run in evidence.filters
         if run.errors is not None and run.errors.most_inclination_deg <= tolerance
     ]
     if not level:
         return None
-    run = min(level, key=_thrift)
-    assert run.errors is not None
+    run, most = min(level, key=lambda pair: _thrift(pair[0]))
     level_hz = run.lowest_level_hz
     lowest = "" if level_hz is None else f" (within {tolerance:g}° down to {level_hz:.4g} Hz)"
     return (
         f"With {_AIDS[run.aiding]} the filter {run.peer} keeps roll and pitch within "
-        f"{_deg(run.errors.most_inclination_deg)}{lowest}{_heading_words(run)}."
+        f"{_deg(most)}{lowest}{_heading_words(run)}."
     )
 
 
@@ -433,40 +415,36 @@ def _of_budget(evidence: Evidence) -> list[str]:
     budget = evidence.budget
     if budget is None or len(budget.parts) < 2:
         return []
-    found = []
-    for row in budget.parts.to_dict("records")[1:]:
-        what = {"bias": "a bias", "clock": "stamps", "scale and axes": "scale factors and axes"}
-        text = what[row["part"]]
-        if row["part"] == "clock":
-            when = "late" if budget.delay_s > 0 else "early"
-            text += f" {abs(1e3 * budget.delay_s):.3g} ± {1e3 * budget.delay_sd:.2g} ms {when}"
-            if abs(budget.drift_ppm) > 3.0 * budget.drift_sd_ppm:
-                text += f" and drifting by {budget.drift_ppm:.3g} ppm"
-        elif row["part"] == "bias":
-            size = np.degrees(np.sqrt(budget.bias @ budget.bias))
-            text += f" of {size:.2g} deg/s beside that of the rest"
-        found.append(f"{text}: {_deg(row['share_deg'])} ({_deg(row['max_deg'])} left)")
+    size = np.degrees(np.sqrt(budget.bias @ budget.bias))
+    when = "late" if budget.delay_s > 0 else "early"
+    clock = f"stamps {abs(1e3 * budget.delay_s):.3g} ± {1e3 * budget.delay_sd:.2g} ms {when}"
+    if abs(budget.drift_ppm) > 3.0 * budget.drift_sd_ppm:
+        clock += f" and drifting by {budget.drift_ppm:.3g} ppm"
+    words = {
+        "bias": f"a bias of {size:.2g} deg/s beside that of the rest",
+        "clock": clock,
+        "scale and axes": "scale factors and axes",
+    }
+    found = [
+        f"{words[row['part']]}: {_deg(row['share_deg'])} ({_deg(row['max_deg'])} left)"
+        for row in budget.parts.to_dict("records")[1:]
+    ]
     return [
         "Parts of the sensor's error by the reference, removed one after the other: "
-        + "; ".join(found)
-        + "."
+        f"{'; '.join(found)}."
     ]
 
 
 def _improvements(evidence: Evidence, sensor: float) -> list[str]:
     """Name the part whose removal helps, the cheapest first."""
-    budget = evidence.budget
-    if budget is None:
-        return []
-    found = []
-    for part in ("bias", "scale and axes"):
-        left = budget.left_without(part)
-        if left is None:
+    found, budget = [], evidence.budget
+    order = [] if budget is None else budget.parts["part"].tolist()
+    for part, remedy in _REMEDY.items():
+        if budget is None or part not in order:
             continue
-        order = budget.parts["part"].tolist()
-        before = float(budget.parts["max_deg"].iloc[order.index(part) - 1])
+        before, left = budget.parts["max_deg"].to_numpy()[order.index(part) - 1 :][:2].tolist()
         if left < WORTH * before and before - left > UNSEEN * sensor:
-            found.append(f"{_REMEDY[part]}: {_deg(left)} instead of {_deg(before)}.")
+            found.append(f"{remedy}: {_deg(left)} instead of {_deg(before)}.")
     return found
 
 

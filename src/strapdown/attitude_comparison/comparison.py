@@ -227,19 +227,14 @@ class AttitudeComparison:
         if table.empty:
             table = table.reindex(range(len(self.runs)))
             table["algorithm"] = [run.algorithm for run in self.runs]
-        shares = pd.DataFrame(
-            {"algorithm": share.algorithm}
-            | {
-                f"{part}_{moment}_deg": value
-                for part in ("own", "sensor", "single")
-                for moment, value in zip(
-                    ("final", "rms", "max"),
-                    getattr(share, f"{part}_deg") or (nan, nan, nan),
-                    strict=True,
-                )
-            }
-            for share in self.shares
-        )
+        rows: list[dict[str, Any]] = []
+        for share in self.shares:
+            rows.append({"algorithm": share.algorithm})
+            for part in ("own", "sensor", "single"):
+                values = getattr(share, f"{part}_deg") or (nan, nan, nan)
+                named = zip(("final", "rms", "max"), values, strict=True)
+                rows[-1] |= {f"{part}_{moment}_deg": value for moment, value in named}
+        shares = pd.DataFrame(rows)
         costs = pd.DataFrame([vars(cost) for cost in self.costs])
         table = table.merge(shares, on="algorithm", how="left")
         return table.merge(costs, on="algorithm", how="left")
@@ -549,18 +544,15 @@ def _gyro_bias(
             )
         longest = max(found, key=lambda r: r.end - r.start)
         files = (input_files("gyro-bias", spec.gyro_bias_path, other.files),)
-        bias, where = (
-            longest.gyro_mean,
-            f"{longest.end - longest.start:.4g} s of rest in {other.name}",
-        )
+        where = f"{longest.end - longest.start:.4g} s of rest in {other.name}"
+        bias = longest.gyro_mean
     elif choice in ("none", "nothing", "turned"):
         why = "not removed, not requested"
         if choice == "turned":
             why = "not removed: the magnetic field turns in what looks like a rest"
         elif choice == "nothing":
-            why = "not removed: " + (
-                "that of the rest is within its noise" if rests else "no rest shows it"
-            )
+            noise = "that of the rest is within its noise"
+            why = f"not removed: {noise if rests else 'no rest shows it'}"
         return imu, {"rad_per_s": None, "from": why}, ()
     elif choice in ("rest", "rests"):
         if not rests:
@@ -594,11 +586,8 @@ def _of_field(
     iron: dict[str, Any] = {}
     if not set(MAG + ACCEL) <= set(imu.columns):
         if spec.place is not None or spec.magnetometer != "auto":
-            findings.append(
-                Finding(
-                    "attitude.no-field-here", file=source.name, quantity="--magnetometer, --lat"
-                )
-            )
+            asked = "--magnetometer, --lat"
+            findings.append(Finding("attitude.no-field-here", file=source.name, quantity=asked))
         return imu, (declination, sd), iron, files
     from strapdown.sensors.magnetometer import calibrate_magnetometer, without_iron
 
@@ -629,16 +618,9 @@ def _turn_or_bias(rest: RestStretch, source: AttitudeSource) -> list[Finding]:
     """Doubt whether a rest is one, where no magnetometer distinguishes it from a steady turn."""
     if set(MAG) <= set(source.imu.columns) or not could_be_a_turn(rest):
         return []
-    return [
-        Finding(
-            "attitude.bias-or-turn",
-            file=source.name,
-            quantity="gyro",
-            severity="warning",
-            bias=float(np.degrees(np.linalg.norm(rest.gyro_mean))),
-            duration=rest.end - rest.start,
-        )
-    ]
+    size, code = float(np.degrees(np.linalg.norm(rest.gyro_mean))), "attitude.bias-or-turn"
+    data = {"bias": size, "duration": rest.end - rest.start}
+    return [Finding(code, file=source.name, quantity="gyro", data=data)]
 
 
 #: Rates across the main axis of a motion, as a share of those along it, below which the other two
@@ -652,27 +634,14 @@ def _proves_little(imu: pd.DataFrame, source: AttitudeSource) -> list[Finding]:
         return []
     rates = values_of(imu, GYRO)
     spread = np.sqrt(np.maximum(np.linalg.eigvalsh(rates.T @ rates / len(rates)), 0.0))
+    name, about = source.name, "gyro"
     if spread[2] < TURNING:
-        return [
-            Finding(
-                "attitude.hardly-turns",
-                file=source.name,
-                quantity="gyro",
-                severity="warning",
-                rate=float(np.degrees(spread[2])),
-            )
-        ]
+        rate = float(np.degrees(spread[2]))
+        return [Finding("attitude.hardly-turns", file=name, quantity=about, rate=rate)]
     if spread[1] >= ACROSS * spread[2]:
         return []
-    return [
-        Finding(
-            "attitude.one-axis",
-            file=source.name,
-            quantity="gyro",
-            severity="warning",
-            across=float(spread[1] / spread[2]),
-        )
-    ]
+    across = float(spread[1] / spread[2])
+    return [Finding("attitude.one-axis", file=name, quantity=about, across=across)]
 
 
 def _stated_bias(text: str) -> tuple[list[float], str]:
@@ -737,28 +706,16 @@ def initial_attitude(
             )
         tilt = rotation.level(rests[0].accel_mean)
         if abs(tilt[0]) > 90.0:
-            findings.append(
-                Finding(
-                    "attitude.levelled-upside-down-roll",
-                    file=name,
-                    quantity="accel",
-                    roll=tilt[0],
-                )
-            )
+            code = "attitude.levelled-upside-down-roll"
+            findings.append(Finding(code, file=name, quantity="accel", roll=tilt[0]))
         q_nb = rotation.quaternion_from_euler([*tilt, 0.0])
     elif choice == "zero":
         q_nb = np.array([1.0, 0.0, 0.0, 0.0])
         later = next((one for one in rests if one.accel_mean is not None), None)
         if text.strip().lower() == "auto" and later is not None:
-            findings.append(
-                Finding(
-                    "attitude.rest-after-begin",
-                    file=name,
-                    quantity="initial",
-                    severity="warning",
-                    begin=float(np.ceil(100.0 * later.start) / 100.0),
-                )
-            )
+            at = float(np.ceil(100.0 * later.start) / 100.0)
+            code = "attitude.rest-after-begin"
+            findings.append(Finding(code, file=name, quantity="initial", begin=at))
     else:
         try:
             angles = [float(part) for part in text.split(",")]

@@ -148,14 +148,9 @@ def gather_references(
             raise ConfigError("attitude.no-rest", file=source.name, quantity=asks)
         tilts = tilt_references(usable, levelled_from=usable[0] if levelled else None)
         if tilts.empty:
+            rest = {"start": usable[0].start, "end": usable[0].end}
             findings.append(
-                Finding(
-                    "attitude.one-rest",
-                    file=source.name,
-                    quantity=asks,
-                    start=usable[0].start,
-                    end=usable[0].end,
-                )
+                Finding("attitude.one-rest", file=source.name, quantity=asks, data=rest)
             )
         points = pd.concat([points, tilts], ignore_index=True) if len(points) else tilts
     return points, positions, same_pose_candidates(usable) if points.empty else ()
@@ -212,13 +207,8 @@ def truth_of_second(
     bias = rests[0].gyro_mean if rests else (0.0, 0.0, 0.0)
     findings = source.findings
     if not rests:
-        findings += (
-            Finding(
-                "attitude.no-rest-found-bias-truth",
-                file=second.name,
-                quantity="gyro bias",
-            ),
-        )
+        code = "attitude.no-rest-found-bias-truth"
+        findings += (Finding(code, file=second.name, quantity="gyro bias"),)
     truth = truth_from_second_log(aligned, imu, second.imu, gyro_bias=bias, q_start=q_nb)
     return replace(source, truth=truth, scored=np.ones(len(truth), dtype=bool), findings=findings)
 
@@ -265,14 +255,9 @@ def judge(
     for run in runs:
         if passed_pole(run):
             apart = run.diagnostics["closest_to_pole_deg"]
-            findings.append(
-                Finding(
-                    "attitude.near-vertical-pitch" if apart else "attitude.through-vertical-pitch",
-                    quantity=run.algorithm,
-                    apart_deg=apart,
-                    time=run.diagnostics["closest_to_pole_time_s"],
-                )
-            )
+            code = "attitude.near-vertical-pitch" if apart else "attitude.through-vertical-pitch"
+            time = run.diagnostics["closest_to_pole_time_s"]
+            findings.append(Finding(code, quantity=run.algorithm, apart_deg=apart, time=time))
     turn = np.sqrt((increments[THETA].to_numpy() ** 2).sum(axis=1))
     # Gaps are reported by the reader.
     turn[[gap.sample - 1 for gap in find_gaps(runs[0].attitude.index)]] = 0.0

@@ -15,6 +15,7 @@ from functools import cached_property, lru_cache
 from typing import Any, Protocol
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
@@ -142,41 +143,23 @@ class BulkCrash(_Streams):
     @cached_property
     def nominal(self) -> Mapping[str, float]:
         """Results of the reconstruction itself."""
-        row = self.unit.path.table.iloc[-1]
-        out = {f"end_{axis}_m": float(row[axis]) for axis in NED}
-        out |= {f"end_velocity_{a}_m_per_s": float(row[f"V{a[0].upper()}"]) for a in NED}
-        out["end_heading_deg"] = float(row["heading"])
+        change: tuple[float, ...] = ()
         if self._change is not None:
             vector = self._change.delta_v.vector
-            out |= {
-                "delta_v_forward_m_per_s": float(vector[0]),
-                "delta_v_right_m_per_s": float(vector[1]),
-                "delta_v_total_m_per_s": self._change.resultant,
-                "delta_v_total_km_per_h": self._change.resultant / SPEEDS["km/h"],
-                "pdof_deg": pdof(vector).horizontal_deg,
-            }
-        return out
+            angle = pdof(vector).horizontal_deg
+            change = float(vector[0]), float(vector[1]), self._change.resultant, angle
+        return _by_name(self.unit.path.table.iloc[-1], *change)
 
     @cached_property
     def linear_sd(self) -> Mapping[str, float]:
         """Standard deviations of the reconstruction; of the PDOF to first order."""
-        path = self.unit.path
-        sd = path.sd.iloc[-1]
-        out = {f"end_{axis}_m": float(sd[axis]) for axis in NED}
-        out |= {f"end_velocity_{a}_m_per_s": float(sd[f"V{a[0].upper()}"]) for a in NED}
-        out["end_heading_deg"] = float(sd["heading"])
+        change: tuple[float, ...] = ()
         if self._change is not None:
             vector, bound = self._change.delta_v.vector, self._change.bound
-            total = bound.along(vector)
             across = np.array([-vector[1], vector[0]]) / (vector[:2] @ vector[:2])
-            out |= {
-                "delta_v_forward_m_per_s": bound.sd[0],
-                "delta_v_right_m_per_s": bound.sd[1],
-                "delta_v_total_m_per_s": total,
-                "delta_v_total_km_per_h": total / SPEEDS["km/h"],
-                "pdof_deg": math.degrees(math.sqrt(across @ bound.covariance[:2, :2] @ across)),
-            }
-        return out
+            angle = math.degrees(math.sqrt(across @ bound.covariance[:2, :2] @ across))
+            change = bound.sd[0], bound.sd[1], bound.along(vector), angle
+        return _by_name(self.unit.path.sd.iloc[-1], *change)
 
     def _stream(self, number: int) -> Array:
         errors = np.empty((TOGETHER, 1, 9))
@@ -261,19 +244,26 @@ class BulkCrash(_Streams):
         return body_effects(effects, weights), [back, ahead], _root(rest)
 
 
+def _by_name(end: pd.Series, *change: float) -> dict[str, float]:
+    """Results of a crash: of the last row of its path, and of the change of velocity, if known.
+
+    `change`: forward, right and total, m/s, and the PDOF, deg.
+    """
+    out = {f"end_{axis}_m": float(end[axis]) for axis in NED}
+    out |= {f"end_velocity_{a}_m_per_s": float(end[f"V{a[0].upper()}"]) for a in NED}
+    out["end_heading_deg"] = float(end["heading"])
+    if change:
+        forward, right, total, angle = change
+        out |= {"delta_v_forward_m_per_s": forward, "delta_v_right_m_per_s": right}
+        out |= {"delta_v_total_m_per_s": total, "delta_v_total_km_per_h": total / SPEEDS["km/h"]}
+        out["pdof_deg"] = angle
+    return out
+
+
 def bulk_crash(spec: CaseSpec, seed: int = 0) -> BulkCrash:
-    """Prepare many possible truths of a crash.
+    """Prepare many possible truths of a crash; its record is reconstructed once.
 
-    Parameters
-    ----------
-    spec : CaseSpec
-        With absolute paths; its record is reconstructed once.
-    seed : int
-
-    Raises
-    ------
-    ConfigError, DataError, DivergenceError
-        As `run_case`.
+    `spec`: with absolute paths. ConfigError, DataError, DivergenceError: as `run_case`.
     """
     return BulkCrash(reconstruct_case(spec).main, seed)
 
@@ -611,22 +601,11 @@ def bulk_attitude(
     algorithm: str = "quaternion",
     seed: int = 0,
 ) -> BulkAttitude:
-    """Prepare many units of a sensor along a motion.
+    """Prepare many units of a sensor, of the catalogue or a file, along a motion.
 
-    Parameters
-    ----------
-    motion : ScenarioSpec or TrajectorySpec
-        Its rate and its kind of samples are used, its sensor and its seed are not.
-    sensor : str
-        Of the catalogue, or a file.
-    algorithm : str
-        A name with its options.
-    seed : int
-
-    Raises
-    ------
-    ConfigError
-        Motion, sensor or algorithm are unknown, or the sensor has jitter.
+    `motion`: its rate and its kind of samples are used, its sensor and its seed are not.
+    `algorithm`: a name with its options. ConfigError: motion, sensor or algorithm are unknown, or
+    the sensor has jitter.
     """
     known, chosen = load_sensor(sensor), make_algorithm(algorithm)
     errors = known.imu_errors.gyro

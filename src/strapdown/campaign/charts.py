@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from strapdown.report.chart import (
     Line,
     Mark,
     Panel,
+    dots,
     kept_rows,
     look,
 )
@@ -111,43 +113,36 @@ def over_grid(results: Results) -> Iterator[Chart]:
 
 def _axis_chart(results: Results, name: str, axis: str, layout: Layout) -> Chart:
     """Median and 5 to 95 % of a scalar over a numeric grid parameter."""
-    panels, ends = [], []
+    scalars = [cell["scalars"][name] for cell in results.cells]
+    low, _, high = _ends_and_middle(scalars)
+    log = over_decades([*low.tolist(), *high.tolist()])
+    panels = []
     for title, lines in layout:
         fills, drawn = [], []
         for k, (line, cells) in enumerate(lines):
             ordered = sorted(cells, key=lambda cell: cell["parameters"][axis])
             x = np.array([float(cell["parameters"][axis]) for cell in ordered])
             low, middle, high = _ends_and_middle([cell["scalars"][name] for cell in ordered])
-            words = line or "median"
-            drawn.append(Line(words, x, middle, **_look(k), dots=True, size=7.0))
-            fills.append(Fill(words, x, low, high, look(k)["colour"], 0.14, legend=False))
-            ends += [*low.tolist(), *high.tolist()]
-        panels.append((title, tuple(drawn), tuple(fills)))
-    log = over_decades(ends)
+            words, style = line or "median", dict[str, Any](look(k))
+            drawn.append(Line(words, x, middle, **style, dots=True, size=7.0))
+            fills.append(Fill(words, x, low, high, style["colour"], 0.14, legend=False))
+        panels.append(Panel(label(name), tuple(drawn), log=log, title=title, fills=tuple(fills)))
     values = [float(v) for v in results.grid[axis]]
     return Chart(
         f"grid-{name}",
         _title(name),
         f"Line: median of the cases of a cell. Band: 5 to 95{GAP}% of the cases.",
         results.parameter(axis),
-        tuple(
-            Panel(label(name), lines, log=log, title=title, fills=fills)
-            for title, lines, fills in panels
-        ),
+        tuple(panels),
         log_x=min(values) > 0.0 and max(values) >= 10.0 * min(values),
     )
-
-
-def _look(k: int) -> dict[str, Any]:
-    return dict(look(k))
 
 
 def _category_chart(results: Results, name: str) -> Chart:
     """Median and 5 to 95 % of a scalar of each cell, one below the other."""
     low, middle, high = _ends_and_middle([cell["scalars"][name] for cell in results.cells])
-    at = np.arange(len(results.cells), dtype=np.float64)
-    points: dict[str, Any] = {"points": True, "symbol": "circle", "low": low, "high": high}
-    line = Line("median, and 5 to 95 %", middle, at, BLUE, **points)
+    at, title = np.arange(len(results.cells)), "median, and 5 to 95 %"
+    line = dots(title, middle, at, BLUE, "circle", low=low, high=high)
     return Chart(
         f"grid-{name}",
         _title(name),
@@ -218,8 +213,8 @@ def _sobol_chart(results: Results, cell: Cell, name: str, found: Mapping[str, An
             np.array([number(one[f"{kind}{end}"]) for one in rows]) for end in ("", "_low", "_high")
         )
         bars.append(Bars(words, at + off, value, colour, width=0.36, pattern=pattern))
-        ends: dict[str, Any] = {"points": True, "size": 0.0, "low": low, "high": high}
-        lines.append(Line(f"{words}, interval", value, at + off, BLACK, **ends, legend=False))
+        interval = dots(f"{words}, interval", value, at + off, BLACK, size=0.0, low=low, high=high)
+        lines.append(replace(interval, legend=False))
     first = sum(number(one["first"]) for one in rows)
     caption = (
         f"Share of the variance due to each parameter alone (first order, together "
@@ -265,14 +260,10 @@ def _histograms(results: Results, name: str, cells: Sequence[Cell]) -> Chart:
         x = np.repeat(np.array(one["edges"], dtype=np.float64), 2)[1:-1]
         y = np.repeat(np.array(one["counts"], dtype=np.float64), 2)
         colour = look(k)["colour"] if many else BLUE
-        panels.append(
-            Panel(
-                f"{noun}s",
-                (Line(f"{noun}s", x, y, colour, legend=False),),
-                title=results.cell_name(cell) if many else "",
-                fills=(Fill("", x, 0.0 * y, y, colour, 0.35, legend=False),),
-            )
-        )
+        line = Line(f"{noun}s", x, y, colour, legend=False)
+        fill = Fill("", x, 0.0 * y, y, colour, 0.35, legend=False)
+        title = results.cell_name(cell) if many else ""
+        panels.append(Panel(f"{noun}s", (line,), title=title, fills=(fill,)))
     log = all(one["log"] for one in found)
     caption = f"{capital(noun)}s by value, in steps of equal {'ratio' if log else 'width'}."
     if beyond := sum(one["below"] + one["above"] for one in found):
@@ -336,7 +327,7 @@ def _logs_panel(results: Results, name: str, x: Array, cell: Array, y: Array) ->
         far = (y < fences["low_fence"]) | (y > fences["high_fence"])
         kinds = [("log", ~far, BLUE, "circle"), ("far out", far, VERMILLION, "diamond")]
     lines = tuple(
-        Line(words, x[own], y[own], colour, points=True, symbol=symbol, size=4.0)
+        dots(words, x[own], y[own], colour, symbol, 4.0)
         for words, own, colour, symbol in kinds
         if np.isfinite(y[own]).any()
     )

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import copy
+import importlib
 import json
 import math
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +107,31 @@ def with_value(table: Table, path: KeyPath, value: Any) -> Table:
     return out
 
 
+def _named(place: str) -> Callable[..., Any]:
+    """The function of a ``module:name``, imported when it is first called."""
+
+    def call(*given: Any) -> Any:
+        module, _, name = place.partition(":")
+        found = attrgetter(name)(importlib.import_module(f"strapdown.{module}"))
+        return found(*given)
+
+    return call
+
+
+def _checked(form: str, run: str) -> Callable[[Table, str], Any]:
+    """Run a configuration that a form checks; both are named as by `_named`."""
+    check = _named(f"{form}.checked")
+
+    def call(table: Table, name: str) -> Any:
+        return _named(run)(check({**table, "name": name}))
+
+    return call
+
+
+def _save_run(run: Any, out: Path, force: bool) -> Any:
+    return run.save(out, force=force)
+
+
 # --- navigation and alignment -------------------------------------------------------------
 
 
@@ -128,13 +155,6 @@ def _proposed(table: Table) -> Table:
         gnss=None if fixes is None else specify(FixesTable, **fixes),
     )
     return proposal.table
-
-
-def _evaluated(run: Any) -> Any:
-    """The run, compared with its truth."""
-    from strapdown.report.navigation_evaluation import NavigationEvaluation
-
-    return NavigationEvaluation(run)
 
 
 def _navigation_data(evaluation: Any) -> Table:
@@ -183,13 +203,6 @@ def _navigation_curves(evaluation: Any) -> pd.DataFrame:
         },
         index=errors.time - begin,
     )
-
-
-def _align(table: Table, name: str) -> Any:
-    from strapdown.config.alignment import AlignmentSpec
-    from strapdown.systems.alignment_run import run_alignment
-
-    return run_alignment(AlignmentSpec.checked({**table, "name": name}))
 
 
 def _alignment_data(run: Any) -> Table:
@@ -266,35 +279,9 @@ def _outage(table: Table, name: str) -> Any:
     return run_outage(specify(OutageSpec, **table), budget=False)
 
 
-def _outage_data(run: Any) -> Table:
-    from strapdown.report.outage import outage_parts
-
-    return outage_parts(run)
-
-
 def _outage_curves(run: Any) -> pd.DataFrame:
     time, bound, _ = run.cone
     return pd.DataFrame({"horizontal_95_m": bound}, index=time - time[0])
-
-
-def _calibrate(table: Table, name: str) -> Any:
-    from strapdown.config.logs import CalibrateSpec
-    from strapdown.systems.calibrate_run import run_calibrate
-
-    return run_calibrate(CalibrateSpec.checked({**table, "name": name}))
-
-
-def _calibrate_data(run: Any) -> Table:
-    from strapdown.report.calibrate import calibrate_json
-
-    return calibrate_json(run)
-
-
-def _doctor(table: Table, name: str) -> Any:
-    from strapdown.config.logs import DoctorSpec
-    from strapdown.systems.doctor import run_doctor
-
-    return run_doctor(DoctorSpec.checked({**table, "name": name}))
 
 
 def _doctor_data(run: Any) -> Table:
@@ -446,10 +433,6 @@ def _crash_curves(run: Any) -> pd.DataFrame:
 # --- saving a case ------------------------------------------------------------------------
 
 
-def _save_run(run: Any, out: Path, force: bool) -> Any:
-    return run.save(out, force=force)
-
-
 def _save_crash(run: Any, out: Path, force: bool) -> Any:
     if not isinstance(run, _SimulatedCrash):
         return run.save(out, force=force)
@@ -488,10 +471,10 @@ KINDS: dict[str, Kind] = {
         ("log", "path"),
         _navigation_curves,
         ("horizontal_error_m", "horizontal_sd_m", "height_error_m", "heading_error_deg"),
-        _evaluated,
+        _named("report.navigation_evaluation:NavigationEvaluation"),
     ),
     "align": Kind(
-        _align,
+        _checked("config.alignment:AlignmentSpec", "systems.alignment_run:run_alignment"),
         _alignment_data,
         _save_run,
         {
@@ -517,15 +500,14 @@ KINDS: dict[str, Kind] = {
     ),
     "outage": Kind(
         _outage,
-        _outage_data,
+        _named("report.outage:outage_parts"),
         _save_run,
         {
-            "horizontal_95_m": "at_the_end.horizontal_95_m",
-            "along_sd_m": "at_the_end.along_sd_m",
-            "across_sd_m": "at_the_end.across_sd_m",
-            "vertical_sd_m": "at_the_end.vertical_sd_m",
-            "speed_sd_m_per_s": "at_the_end.speed_sd_m_per_s",
-            "heading_sd_deg": "at_the_end.heading_sd_deg",
+            key: f"at_the_end.{key}"
+            for key in (
+                *("horizontal_95_m", "along_sd_m", "across_sd_m", "vertical_sd_m"),
+                *("speed_sd_m_per_s", "heading_sd_deg"),
+            )
         },
         curves=_outage_curves,
         curve_names=("horizontal_95_m",),
@@ -547,25 +529,22 @@ KINDS: dict[str, Kind] = {
         curve_names=("north_m", "east_m", "speed_m_per_s"),
     ),
     "calibrate": Kind(
-        _calibrate,
-        _calibrate_data,
+        _checked("config.logs:CalibrateSpec", "systems.calibrate_run:run_calibrate"),
+        _named("report.calibrate:calibrate_json"),
         _save_run,
         {"rests": "rests", "excess": "excess"},
         log=("logs", 0, "path"),
     ),
     "doctor": Kind(
-        _doctor,
+        _checked("config.logs:DoctorSpec", "systems.doctor:run_doctor"),
         _doctor_data,
         _save_run,
         {
-            "samples": "log.samples",
-            "rate_hz": "log.rate_hz",
-            "duration_s": "log.duration_s",
-            "questions": "log.questions",
-            "faults": "log.faults",
-            "fit_for_attitude": "log.fit_for_attitude",
-            "fit_for_navigation": "log.fit_for_navigation",
-            "fit_for_crash": "log.fit_for_crash",
+            key: f"log.{key}"
+            for key in (
+                *("samples", "rate_hz", "duration_s", "questions", "faults"),
+                *(f"fit_for_{use}" for use in ("attitude", "navigation", "crash")),
+            )
         },
         log=("logs", 0, "path"),
     ),

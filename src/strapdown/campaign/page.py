@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from strapdown import __version__
 from strapdown.campaign import charts
 from strapdown.campaign.results import (
     Cell,
@@ -27,14 +26,17 @@ from strapdown.report.document import (
     Block,
     Document,
     Facts,
-    Items,
     KeyFigure,
     KeyFigures,
     Paragraph,
     TableBlock,
     capital,
+    document_of,
+    items_of,
     section,
+    table_of,
 )
+from strapdown.report.document import listed as listed_texts
 from strapdown.report.values import GAP, share_words
 from strapdown.units import named_unit
 
@@ -67,16 +69,9 @@ _STATUS_WORDS = {
 
 
 def campaign_document(frozen: Mapping[str, Any], summary: Mapping[str, Any], name: str) -> Document:
-    """Return the page of a campaign.
+    """Return the page of a campaign: of its ``campaign.json`` and the statistics of `summarise`.
 
-    Parameters
-    ----------
-    frozen : mapping
-        Content of ``campaign.json``.
-    summary : mapping
-        From `summarise`, or read from its JSON.
-    name : str
-        Folder of the campaign, for the commands on the page.
+    `name`: folder of the campaign, for the commands on the page.
     """
     results = Results(frozen, summary)
     sections = (
@@ -88,19 +83,18 @@ def campaign_document(frozen: Mapping[str, Any], summary: Mapping[str, Any], nam
         section("sensitivity", "Sensitivity", *charts.sensitivity(results)),
         section("distributions", "Distributions", *charts.distributions(results)),
         section("failures", "Failures and findings", *_failures(results, name)),
-        section("outliers", "Outliers", *_outliers(results), folded=not results.is_fleet),
+        section("outliers", "Outliers", _outliers(results), folded=not results.is_fleet),
         section("tables", "All statistics", *_statistics(results), folded=True),
         section("method", "Method", *_method(results), folded=True),
     )
-    return Document(
+    return document_of(
         str(frozen.get("title") or name),
         "Campaign",
         (
             ("Cases", results.cases_words),
             ("Each case", f"strapdown {(frozen.get('base') or {}).get('kind', '')}"),
-            ("Software", f"strapdown {__version__}"),
         ),
-        tuple(_front(results)),
+        _front(results),
         sections,
         links=(
             ("summary.json", "every statistic"),
@@ -112,7 +106,7 @@ def campaign_document(frozen: Mapping[str, Any], summary: Mapping[str, Any], nam
 # Page one.
 
 
-def _front(results: Results) -> Iterator[Block]:
+def _front(results: Results) -> Iterator[Block | None]:
     """Answers: coverages, rates, consistency and failures."""
     failure, cells = results.summary["failure"], results.cells
     text = f"{results.cases_words}: {failure['of'] - failure['hits']:,} done"
@@ -128,14 +122,16 @@ def _front(results: Results) -> Iterator[Block]:
         figures = tuple(_answers(results, cells[0])) or tuple(_medians(results, cells[0]))
         if figures:
             yield KeyFigures(figures)
-        if rows := tuple(_unusual(results)):
-            yield Items(rows)
+        # Of a fleet, findings that most of its logs do not have.
+        yield items_of(
+            (one["code"], f"{_examples(one, one['hits'])}: {share(one)}.")
+            for one in (results.summary["findings"][:ROWS] if results.is_fleet else ())
+            if one["share"] < UNUSUAL
+        )
     elif cells:
-        if rows := tuple(_answers_over_cells(results)):
-            yield Items(rows)
+        yield items_of(_answers_over_cells(results))
         yield _cell_table(results)
-    if rows := tuple(_errors(results)):
-        yield Items(rows)
+    yield items_of(_errors(results))
 
 
 def _errors(results: Results) -> Iterator[tuple[str, str]]:
@@ -145,13 +141,6 @@ def _errors(results: Results) -> Iterator[tuple[str, str]]:
         words = f"{counted(one['count'], results.case_noun)}, the first is {first}"
         state = _STATUS_WORDS.get(one["status"], one["status"])
         yield state, f"{one['code']}: {words}" if one["code"] else words
-
-
-def _unusual(results: Results) -> Iterator[tuple[str, str]]:
-    """Of a fleet, findings that most of its logs do not have."""
-    for one in results.summary["findings"][:ROWS] if results.is_fleet else ():
-        if one["share"] < UNUSUAL:
-            yield one["code"], f"{_examples(one, one['hits'])}: {share(one)}."
 
 
 def _answers(results: Results, cell: Cell) -> Iterator[KeyFigure]:
@@ -306,15 +295,10 @@ def _tests(results: Results) -> Iterator[Block]:
     if not results.cells:
         return
     for k, first in enumerate(results.cells[0]["coverage"]):
-        rows = [
-            (
-                f"{one['of']:,}",
-                share(one),
-                percent(one["low_99"], one["high_99"]),
-                _verdict(one),
-            )
-            for one in (cell["coverage"][k] for cell in results.cells)
-        ]
+        rows = []
+        for one in (cell["coverage"][k] for cell in results.cells):
+            interval = percent(one["low_99"], one["high_99"])
+            rows.append((f"{one['of']:,}", share(one), interval, _verdict(one)))
         title = f"{capital(first['name'])}: {label(first['error'])}, within {label(first['bound'])}"
         columns = ("of", "within the bound", f"99{GAP}% interval", "verdict")
         yield _table(results, columns, rows, text=(3,), title=title)
@@ -381,7 +365,7 @@ def _statistics(results: Results) -> Iterator[Block]:
 # Other tables.
 
 
-def _linear(results: Results) -> Iterator[Block]:
+def _linear(results: Results) -> Iterator[Block | None]:
     """In bulk: standard deviations by linear propagation beside those of the cases."""
     linear = results.frozen.get("linear") or {}
     if not linear or not results.cells:
@@ -392,66 +376,47 @@ def _linear(results: Results) -> Iterator[Block]:
         if not one["count"] or not number(sd) > 0.0 or one["sd"] is None:
             continue
         counts.append(one["count"])
-        rows.append(
-            (
-                label(name),
-                shown(linear["nominal"][name], sd),
-                shown(one["mean"], sd),
-                shown(sd),
-                shown(one["sd"]),
-                f"{one['sd'] / sd:.3f}",
-            )
-        )
-    if rows:
-        scatter = 100.0 / math.sqrt(2.0 * min(counts))
-        yield TableBlock(
-            ("scalar", "unperturbed", "mean", "sd, linear", "sd, of the cases", "ratio"),
-            tuple(rows),
-            caption=(
-                "Where the ratio is one, linear propagation suffices. By chance it differs by "
-                f"{scatter:.2g}{GAP}% (1 sd, of normal values)."
-            ),
-        )
+        values = shown(linear["nominal"][name], sd), shown(one["mean"], sd), shown(sd)
+        rows.append((label(name), *values, shown(one["sd"]), f"{one['sd'] / sd:.3f}"))
+    scatter = 100.0 / math.sqrt(2.0 * min(counts, default=1))
+    yield table_of(
+        "scalar | unperturbed | mean | sd, linear | sd, of the cases | ratio",
+        rows,
+        "Where the ratio is one, linear propagation suffices. By chance it differs by "
+        f"{scatter:.2g}{GAP}% (1 sd, of normal values).",
+    )
 
 
-def _failures(results: Results, folder: str) -> Iterator[Block]:
+def _failures(results: Results, folder: str) -> Iterator[Block | None]:
     """What failed, what was found, and how a case is repeated."""
     summary, noun = results.summary, results.case_noun
-    errors, findings = summary["errors"], summary["findings"]
+    errors, findings, failure = summary["errors"], summary["findings"], summary["failure"]
     if not summary["count"]:
         return
-    if errors:
-        yield TableBlock(
-            ("state", "code", f"{noun}s", "which"),
-            tuple(
-                (
-                    _STATUS_WORDS.get(one["status"], one["status"]),
-                    one["code"] or "–",
-                    f"{one['count']:,}",
-                    _examples(one, one["count"]),
-                )
-                for one in errors[:ROWS]
-            ),
-            text=(0, 1, 3),
-            title=f"{capital(noun)}s that are not done",
-            caption=f"In all {share(summary['failure'])} with the 95{GAP}% interval.",
-        )
-    else:
-        failure = summary["failure"]
-        yield Paragraph(
-            f"Every {noun} is done; the 95{GAP}% interval of the share of failures is "
-            f"{percent(failure['low'], failure['high'])}."
-        )
-    if findings:
-        yield TableBlock(
-            ("finding", f"{noun}s", f"share, with its 95{GAP}% interval", "which"),
-            tuple(
-                (one["code"], f"{one['hits']:,}", share(one), _examples(one, one["hits"]))
-                for one in findings[:ROWS]
-            ),
-            text=(0, 3),
-            title="Findings of the results",
-        )
+    rows = []
+    for one in errors[:ROWS]:
+        state = _STATUS_WORDS.get(one["status"], one["status"])
+        count = one["count"]
+        rows.append((state, one["code"] or "–", f"{count:,}", _examples(one, count)))
+    yield table_of(
+        f"state | code | {noun}s | which",
+        rows,
+        f"In all {share(failure)} with the 95{GAP}% interval.",
+        text=(0, 1, 3),
+        title=f"{capital(noun)}s that are not done",
+    ) or Paragraph(
+        f"Every {noun} is done; the 95{GAP}% interval of the share of failures is "
+        f"{percent(failure['low'], failure['high'])}."
+    )
+    yield table_of(
+        f"finding | {noun}s | share, with its 95{GAP}% interval | which",
+        (
+            (one["code"], f"{one['hits']:,}", share(one), _examples(one, one["hits"]))
+            for one in findings[:ROWS]
+        ),
+        text=(0, 3),
+        title="Findings of the results",
+    )
     yield Paragraph("To repeat one of them with its whole report:")
     first = errors[0]["cases"][0] if errors else 0
     yield Paragraph(f"strapdown campaign case {folder} {first}", "mono")
@@ -466,7 +431,7 @@ def _examples(one: Mapping[str, Any], count: int) -> str:
     return ", ".join(names) + more
 
 
-def _outliers(results: Results) -> Iterator[Block]:
+def _outliers(results: Results) -> Block | None:
     """Cases far beyond the quartiles."""
     rows: list[tuple[str, ...]] = []
     many, total = len(results.cells) > 1, 0
@@ -481,35 +446,31 @@ def _outliers(results: Results) -> Iterator[Block]:
             for one in found["worst"][: 3 if many else None]:
                 what = f"{one['log']} ({one['case']})" if "log" in one else str(one["case"])
                 rows.append((label(name), *where, what, shown(one["value"]), " to ".join(ends)))
-    if not rows:
-        return
     caption = (
         "Values beyond the quartiles by more than three times the distance between them, the "
         f"farthest {'three of each cell' if many else 'ten of each scalar'}; in all {total:,}."
     )
     if len(rows) > ROWS:
         caption += f" {len(rows) - ROWS} more rows are in summary.json."
-    yield TableBlock(
-        ("scalar", *(("cell",) if many else ()), results.case_noun, "value", "quartiles"),
-        tuple(rows[:ROWS]),
-        text=(0, 1, 2) if many else (0, 1),
-        caption=caption,
-    )
+    columns = f"scalar |{' cell |' if many else ''} {results.case_noun} | value | quartiles"
+    return table_of(columns, rows[:ROWS], caption, text=(0, 1, 2) if many else (0, 1))
 
 
 # Method.
 
 
-def _method(results: Results) -> Iterator[Block]:
+def _method(results: Results) -> Iterator[Block | None]:
     """What varied, and how the intervals are made."""
     frozen = results.frozen
-    rows = [
-        (one["name"], one.get("key", ""), results.unit(one["name"]) or "–", _distribution(one))
-        for one in frozen.get("parameters") or ()
-    ]
-    if rows:
-        columns = ("parameter", "key", "unit", "values")
-        yield TableBlock(columns, tuple(rows), (0, 1, 2, 3), title="Parameters")
+    yield table_of(
+        "parameter | key | unit | values",
+        (
+            (one["name"], one.get("key", ""), results.unit(one["name"]) or "–", _distribution(one))
+            for one in frozen.get("parameters") or ()
+        ),
+        text=(0, 1, 2, 3),
+        title="Parameters",
+    )
     if given := frozen.get("cases") or {}:
         words = {
             "random": "independent draws",
@@ -522,14 +483,9 @@ def _method(results: Results) -> Iterator[Block]:
         asked = f"{draws:,} in each cell{' and of each log' if results.is_fleet else ''}"
         if method == "sensitivity":
             asked = f"{counted(draws, 'base sample')} of {len(results.drawn) + 2} cases"
-        yield Facts(
-            (
-                ("Draws", asked),
-                ("Method", words.get(method, method)),
-                ("Seed", f"{given.get('seed', '–')}"),
-            )
-        )
-    yield Items(tuple(("", text) for text in _method_words(results)))
+        facts = (("Draws", asked), ("Method", words.get(method, method)))
+        yield Facts((*facts, ("Seed", f"{given.get('seed', '–')}")))
+    yield listed_texts(_method_words(results))
 
 
 def _method_words(results: Results) -> Iterator[str]:

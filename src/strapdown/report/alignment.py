@@ -21,6 +21,7 @@ from strapdown.report.alignment_document import (
 )
 from strapdown.report.report_bundle import (
     ReportBundle,
+    alignment_data,
     as_comments,
     file_of,
     finite,
@@ -72,8 +73,7 @@ def _history(history: pd.DataFrame) -> pd.DataFrame:
     units = dict.fromkeys(EULER, "deg")
     units |= {f"gyro_bias_{a}": "rad_per_s" for a in "xyz"}
     units |= {f"accel_bias_{a}": "m_per_s2" for a in "xyz"}
-    names = {n: f"{n}_{u}" for n, u in units.items()}
-    names |= {f"{n}_sd": f"{n}_sd_{u}" for n, u in units.items()}
+    names = {n + of: f"{n}{of}_{u}" for n, u in units.items() for of in ("", "_sd")}
     return history.rename(columns=names)
 
 
@@ -88,8 +88,8 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
     dict
         Angles and their standard deviations in degrees, biases in rad/s and m/s².
     """
-    error = answer_error(result)
-    spec = result.spec
+    error, spec = answer_error(result), result.spec
+    fine, prefilter = result.fine, result.prefilter
     data = {
         "record": {
             "name": result.source.name,
@@ -110,15 +110,34 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
         "trust": trust(result).json(),
         "limits": [f"{head}: {text}" for head, text in limits(result)],
         "coarse": {"method": result.coarse.method, **_attitude_alignment_json(result.coarse)},
-        "fine": None if result.fine is None else _fine(result),
-        "compared_with": None
-        if error is None
-        else {
+        "fine": fine
+        and {
+            **_attitude_alignment_json(fine.alignment),
+            **{
+                f"{triad}{of}_{unit}": None if value is None else value.tolist()
+                for triad, unit in (("gyro_bias", "rad_per_s"), ("accel_bias", "m_per_s2"))
+                for of in ("", "_sd")
+                for value in (getattr(fine.alignment, f"{triad}{of}"),)
+            },
+            "stationary": {
+                "position_sd_m": fine.standing.position.tolist(),
+                "velocity_sd_m_per_s": fine.standing.velocity.tolist(),
+                "turn_sd_rad": fine.standing.turn.tolist(),
+            },
+        },
+        "compared_with": error
+        and {
             "name": error[0],
             "sd_deg": error[2],
             "off_deg": dict(zip(EULER, error[1], strict=True)),
         },
-        "prefilter": _prefilter(result),
+        "prefilter": prefilter
+        and {
+            "name": prefilter.name,
+            "delay_s": prefilter.delay,
+            "replaced": len(prefilter.replaced),
+            "share": {k: float(v) for k, v in prefilter.share.items()},
+        },
         "readiness": {
             "against": result.readiness.against,
             "coarse": _rows(result.readiness.coarse),
@@ -131,10 +150,10 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
             {
                 "turn": one.name,
                 "rest_s": one.rest,
-                "tilt_sd_deg": [float(x) for x in one.sd_deg[:2]],
-                "heading_sd_deg": float(one.sd_deg[2]),
-                "gyro_bias_sd_rad_per_s": [float(x) for x in one.gyro_bias_sd],
-                "accel_bias_sd_m_per_s2": [float(x) for x in one.accel_bias_sd],
+                "tilt_sd_deg": list(one.sd_deg[:2]),
+                "heading_sd_deg": one.sd_deg[2],
+                "gyro_bias_sd_rad_per_s": list(one.gyro_bias_sd),
+                "accel_bias_sd_m_per_s2": list(one.accel_bias_sd),
             }
             for one in result.manoeuvres
         ],
@@ -147,48 +166,10 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
 
 
 def _attitude_alignment_json(one: Alignment) -> dict[str, Any]:
-    angles, sd = one.roll_pitch_heading, one.sd_deg
-    return {
-        "time_s": one.time,
-        **{f"{a}_deg": float(angles[k]) for k, a in enumerate(EULER)},
-        **{f"{a}_sd_deg": float(sd[k]) for k, a in enumerate(EULER)},
-        "q_nb": [float(x) for x in one.q_nb],
-        "covariance_ned_rad2": [[float(x) for x in row] for row in one.covariance],
-    }
-
-
-def _fine(result: AlignmentRun) -> dict[str, Any]:
-    assert result.fine is not None
-    end = result.fine.alignment
-    return {
-        **_attitude_alignment_json(end),
-        **{
-            name: None if value is None else [float(x) for x in value]
-            for name, value in (
-                ("gyro_bias_rad_per_s", end.gyro_bias),
-                ("gyro_bias_sd_rad_per_s", end.gyro_bias_sd),
-                ("accel_bias_m_per_s2", end.accel_bias),
-                ("accel_bias_sd_m_per_s2", end.accel_bias_sd),
-            )
-        },
-        "stationary": {
-            "position_sd_m": result.fine.standing.position.tolist(),
-            "velocity_sd_m_per_s": result.fine.standing.velocity.tolist(),
-            "turn_sd_rad": result.fine.standing.turn.tolist(),
-        },
-    }
-
-
-def _prefilter(result: AlignmentRun) -> dict[str, Any] | None:
-    report = result.prefilter
-    if report is None:
-        return None
-    return {
-        "name": report.name,
-        "delay_s": report.delay,
-        "replaced": len(report.replaced),
-        "share": {k: float(v) for k, v in report.share.items()},
-    }
+    data = alignment_data(one)
+    del data["method"]
+    covariance = [list(row) for row in one.covariance]
+    return {**data, "q_nb": list(one.q_nb), "covariance_ned_rad2": covariance}
 
 
 def _thinned(table: pd.DataFrame) -> pd.DataFrame:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from strapdown import __version__, rotation
+from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.fine import ROCKS
 from strapdown.alignment.readiness import STAY
@@ -41,11 +42,14 @@ from strapdown.report.document import (
     TableBlock,
     Trust,
     assumed,
-    blocks,
+    document_of,
     findings_list,
+    items_of,
+    paragraph,
     reason,
     run_again,
     section,
+    table_of,
 )
 from strapdown.report.values import (
     GAP,
@@ -91,30 +95,22 @@ def trust(result: AlignmentRun) -> Trust:
     """Judge the answer by the evidence in its own record."""
     reasons: list[Finding] = []
     known = answer_error(result)
-    sd = result.end.sd_deg
     if known is not None:
         name, off, own = known
-        bound = TWO_SIDED_95 * np.hypot(sd, own)
+        bound = TWO_SIDED_95 * np.hypot(result.end.sd_deg, own)
         for k in ORDER:
             if math.isfinite(off[k]):
                 good = bool(abs(off[k]) <= 3.0 / TWO_SIDED_95 * bound[k])
-                within = bool(abs(off[k]) <= bound[k])
-                reasons.append(
-                    reason(
-                        good,
-                        "alignment.error-within-bound"
-                        if within
-                        else "alignment.error-beyond-bound",
-                        angle=EULER[k],
-                        reference=name,
-                        off_deg=off[k],
-                        bound_deg=bound[k],
-                    )
-                )
+                within, beyond = "alignment.error-within-bound", "alignment.error-beyond-bound"
+                code = within if abs(off[k]) <= bound[k] else beyond
+                sizes = {"off_deg": off[k], "bound_deg": bound[k]}
+                reasons.append(reason(good, code, angle=EULER[k], reference=name, **sizes))
     # Causes come before their effects.
     told = [*result.unread, *result.coarse.findings]
     told += () if result.fine is None else result.fine.findings
-    reasons += [f for f in told if f.severity == "warning" and not _allowed(f, result)]
+    # The inertial frame alignment is designed for a body that rocks.
+    allowed = {ROCKS} if result.coarse.method == "inertial_frame" else set()
+    reasons += [f for f in told if f.severity == "warning" and f.code not in allowed]
     reasons += _agreement(result)
     reasons += _surprises(result)
     against = [one for one in reasons if one.severity == "warning"]
@@ -124,26 +120,17 @@ def trust(result: AlignmentRun) -> Trust:
     wrong = known is not None and bool(against) and reasons[0].severity == "warning"
     if len(against) - counted > 1 or wrong:
         verdict = "distrusted"
-    return Trust(verdict, tuple(reasons), _short(result, known is not None))
+    short = ["alignment.near-known"] if known is not None else []
+    if result.fine is None:
+        short.append("alignment.not-contradicted")
+    else:
+        short += ["alignment.coarse-and-fine-agree", "alignment.sensors-as-expected"]
+    return Trust(verdict, tuple(reasons), tuple(reason(True, code) for code in short))
 
 
 def bounds_hold(result: AlignmentRun) -> bool:
     """Whether the record is consistent with the bounds."""
     return all(one.severity == "note" for one in (*_agreement(result), *_surprises(result)))
-
-
-def _allowed(finding: Finding, result: AlignmentRun) -> bool:
-    """Whether the coarse alignment method is designed for the condition of a finding."""
-    return finding.code == ROCKS and result.coarse.method == "inertial_frame"
-
-
-def _short(result: AlignmentRun, known: bool) -> tuple[Finding, ...]:
-    codes = ["alignment.near-known"] if known else []
-    if result.fine is not None:
-        codes += ["alignment.coarse-and-fine-agree", "alignment.sensors-as-expected"]
-    else:
-        codes.append("alignment.not-contradicted")
-    return tuple(reason(True, code) for code in codes)
 
 
 def _agreement(result: AlignmentRun) -> list[Finding]:
@@ -158,15 +145,8 @@ def _agreement(result: AlignmentRun) -> list[Finding]:
     out = []
     for k in ORDER:
         good = bool(abs(off[k]) <= bound[k])
-        out.append(
-            reason(
-                good,
-                "alignment.angle-agrees" if good else "alignment.angle-disagrees",
-                angle=EULER[k],
-                off_deg=off[k],
-                bound_deg=bound[k],
-            )
-        )
+        code = "alignment.angle-agrees" if good else "alignment.angle-disagrees"
+        out.append(reason(good, code, angle=EULER[k], off_deg=off[k], bound_deg=bound[k]))
     return out
 
 
@@ -180,16 +160,9 @@ def _surprises(result: AlignmentRun) -> list[Finding]:
         ratios = [float(np.sqrt(np.mean(table[f"nu {x}"] ** 2 / table[f"s {x}"]))) for x in labels]
         worst = max(ratios, default=0.0)
         good = worst < 2.0
-        out.append(
-            reason(
-                good,
-                "alignment.innovations-as-expected"
-                if good
-                else "alignment.innovations-larger-than-expected",
-                name=name,
-                ratio=worst,
-            )
-        )
+        code = "alignment.innovations-larger-than-expected"
+        code = "alignment.innovations-as-expected" if good else code
+        out.append(reason(good, code, name=name, ratio=worst))
     return out
 
 
@@ -239,23 +212,12 @@ def readiness_chart(result: AlignmentRun) -> Chart:
             if found.against == "answer" and name == "fine":
                 # The last estimate is the reference itself.
                 size[time > 0.9 * time[-1]] = np.nan
-            lines.append(
-                Line(f"{name}: 95 % bound", time[kept], TWO_SIDED_95 * sd[kept], colour, dash, 2.4)
-            )
-            dots = name == "coarse"
-            lines.append(
-                Line(
-                    f"{name}: {off}",
-                    time[kept],
-                    size[kept],
-                    colour if dots else SKY,
-                    width=1.1,
-                    points=dots,
-                    dots=dots,
-                    symbol="circle",
-                    size=6.0,
-                )
-            )
+            bound = TWO_SIDED_95 * sd[kept]
+            lines.append(Line(f"{name}: 95 % bound", time[kept], bound, colour, dash, 2.4))
+            coarse: dict[str, Any] = {"points": name == "coarse", "dots": name == "coarse"}
+            coarse |= {"colour": colour if name == "coarse" else SKY, "symbol": "circle"}
+            apart = f"{name}: {off}", time[kept], size[kept]
+            lines.append(Line(*apart, width=1.1, size=6.0, **coarse))
         panels.append(Panel("deg", tuple(lines), log=True, title=title, height=1.2))
     begun = "" if result.fine is None else BEGUN
     return Chart(
@@ -272,20 +234,23 @@ def readiness_chart(result: AlignmentRun) -> Chart:
 
 def signal_chart(result: AlignmentRun) -> Chart:
     """Angular rate and specific force: as recorded, as aligned, and 1 s means."""
+    drawn = [("recorded", result.source.imu, GREY, 0.8)]
+    told = "Thin: samples; black: means over 1 s"
+    if result.prefilter is not None:
+        drawn.append(("pre-filtered", result.imu, SKY, 1.0))
+        told += f", after the pre-filter '{result.prefilter.name}'"
     panels = []
     for columns, factor, label in (
         (GYRO, DEG_PER_HOUR, "rate, deg/h"),
         (ACCEL, 1.0, "force, m/s²"),
     ):
-        for k, column in enumerate(columns):
-            lines = [_signal("recorded", result.source.imu, column, factor, GREY, 0.8)]
-            if result.prefilter is not None:
-                lines.append(_signal("pre-filtered", result.imu, column, factor, SKY, 1.0))
+        for column, title in zip(columns, _NAMES, strict=True):
+            lines = []
+            for name, imu, colour, width in drawn:
+                time, values = index_of(imu), factor * imu[column].to_numpy()
+                lines.append(curve(name, time, values, colour, width=width, buckets=500))
             lines.append(_means(result.imu, column, factor))
-            panels.append(Panel(label, tuple(lines), title=_NAMES[k]))
-    told = "Thin: samples; black: means over 1 s"
-    if result.prefilter is not None:
-        told += f", after the pre-filter '{result.prefilter.name}'"
+            panels.append(Panel(label, tuple(lines), title=title))
     return Chart(
         "signals",
         "Signals in body axes",
@@ -294,13 +259,6 @@ def signal_chart(result: AlignmentRun) -> Chart:
         _TIME,
         tuple(panels),
     )
-
-
-def _signal(
-    name: str, imu: pd.DataFrame, column: str, factor: float, colour: str, width: float
-) -> Line:
-    time = index_of(imu)
-    return curve(name, time, factor * imu[column].to_numpy(), colour, width=width, buckets=500)
 
 
 def _means(imu: pd.DataFrame, column: str, factor: float) -> Line:
@@ -316,25 +274,26 @@ def _means(imu: pd.DataFrame, column: str, factor: float) -> Line:
 
 def attitude_chart(result: AlignmentRun) -> Chart:
     """Attitude over the record: the aligned attitude propagated by the gyros."""
-    table = result.attitude
+    table, truth = result.attitude, result.source.truth
     time = index_of(table)
+    step = max(1, len(time) // 400)
     panels = []
     carried = NOT_KNOWN not in [angle_bound(result.start, k) for k in (0, 1)]
     for k, angle in enumerate(EULER):
-        values = table[angle].to_numpy()
-        if angle == "heading":
-            values = np.degrees(np.unwrap(np.radians(values)))
+        values, known = (
+            np.empty(0)
+            if one is None
+            else np.degrees(np.unwrap(np.radians(one[angle].to_numpy())))
+            if angle == "heading"
+            else one[angle].to_numpy()
+            for one in (table, truth)
+        )
         lines = [curve("attitude", time, values, BLUE, buckets=800)]
-        truth = result.source.truth
         if truth is not None:
-            known = truth[angle].to_numpy()
-            if angle == "heading":
-                known = np.degrees(np.unwrap(np.radians(known)))
             lines.append(curve("truth", truth.index.to_numpy(), known, BLACK, "dot", buckets=800))
         halves = TWO_SIDED_95 * np.array([result.start.sd_deg[k], result.end.sd_deg[k]])
-        half = np.interp(time[:: max(1, len(time) // 400)], time[[0, -1]], halves)
-        step = max(1, len(time) // 400)
         x, y = time[::step], values[::step]
+        half = np.interp(x, time[[0, -1]], halves)
         band = Fill("95 % bound", x, y - half, y + half, BLUE)
         panels.append(Panel(f"{angle}, deg", tuple(lines), fills=(band,) if carried else ()))
     return Chart(
@@ -361,18 +320,12 @@ def bias_charts(result: AlignmentRun) -> tuple[Chart, ...]:
         ("accel", MICRO_G, "µg", "Accelerometer biases"),
     ):
         panels = []
-        for k, axis in enumerate("xyz"):
+        for axis, name, colour in zip("xyz", _NAMES, AXIS_COLOURS, strict=True):
             value = factor * history[f"{sensor}_bias_{axis}"].to_numpy()
             half = TWO_SIDED_95 * factor * history[f"{sensor}_bias_{axis}_sd"].to_numpy()
-            colour = AXIS_COLOURS[k]
-            panels.append(
-                Panel(
-                    f"{unit}",
-                    (curve(f"{_NAMES[k]}", time, value, colour, width=1.8),),
-                    title=_NAMES[k],
-                    fills=(Fill("95 % bound", time, value - half, value + half, colour),),
-                )
-            )
+            line = curve(name, time, value, colour, width=1.8)
+            fill = Fill("95 % bound", time, value - half, value + half, colour)
+            panels.append(Panel(unit, (line,), title=name, fills=(fill,)))
         out.append(
             Chart(
                 f"{sensor}-biases",
@@ -445,8 +398,12 @@ def alignment_document(result: AlignmentRun, name: str) -> Document:
     found = trust(result)
     site = result.site
     refused = result.readiness.refused
-    biases = bias_table(result)
     turns = turn_table(result)
+    separated = (
+        "At one attitude a horizontal accelerometer bias is not separable from tilt, nor an east "
+        "gyro bias from heading. A turn separates them: the bias turns with the body, the tilt "
+        "does not."
+    )
     sections = (
         section(
             "answer",
@@ -457,34 +414,26 @@ def alignment_document(result: AlignmentRun, name: str) -> Document:
             Items(limits(result)),
         ),
         section("attitude", "Attitude over the record", attitude_chart(result)),
-        section("sensors", "Sensor biases", biases, *bias_charts(result), innovation_chart(result)),
         section(
-            "more",
-            "Effect of a turn",
-            None
-            if turns is None
-            else Paragraph(
-                "At one attitude a horizontal accelerometer bias is not separable from tilt, nor "
-                "an east gyro bias from heading. A turn separates them: the bias turns with the "
-                "body, the tilt does not."
-            ),
-            turns,
+            "sensors",
+            "Sensor biases",
+            bias_table(result),
+            *bias_charts(result),
+            innovation_chart(result),
         ),
+        section("more", "Effect of a turn", paragraph(separated if turns else None), turns),
         section("signals", "Signals", signal_chart(result), folded=True),
         section(
             "findings",
             "Findings",
             findings_list(result.findings),
-            None
-            if not refused
-            else Items(
+            items_of(
                 (
-                    (
-                        "readiness",
-                        f"{len(refused)} shorter lengths, up to {max(r[0] for r in refused):.3g} "
-                        f"s, gave no attitude: {refused[-1][1].sentence()}.",
-                    ),
+                    "readiness",
+                    f"{len(refused)} shorter lengths, up to {max(r[0] for r in refused):.3g} "
+                    f"s, gave no attitude: {last.sentence()}.",
                 )
+                for _, last in refused[-1:]
             ),
         ),
         section(
@@ -503,17 +452,18 @@ def alignment_document(result: AlignmentRun, name: str) -> Document:
         ),
         section("conventions", "Conventions", Facts(CONVENTIONS), folded=True),
     )
+    given = result.spec.sensors
+    stated = ", ".join((*(f"gyro {k}" for k in given.gyro), *(f"accel {k}" for k in given.accel)))
     title = result.spec.title or f"Alignment of {result.source.name}"
-    return Document(
+    return document_of(
         title,
         headline(result),
         (
             ("Record", f"{result.source.name}, {result.source.what}"),
             ("Position", f"{site.lat_deg:.6f}°, {site.lon_deg:.6f}°, {site.alt:g} m"),
-            ("Sensors", _sensors(result)),
-            ("Software", f"strapdown {__version__}"),
+            ("Sensors", "; ".join(p for p in (given.sensor, stated and f"stated: {stated}") if p)),
         ),
-        blocks(
+        (
             KeyFigures(key_figures(result)),
             found.paragraph,
             Items(limits(result)),
@@ -521,15 +471,8 @@ def alignment_document(result: AlignmentRun, name: str) -> Document:
             readiness_table(result),
         ),
         sections,
-        title,
+        footer=title,
     )
-
-
-def _sensors(result: AlignmentRun) -> str:
-    given = result.spec.sensors
-    stated = [*(f"gyro {k}" for k in given.gyro), *(f"accel {k}" for k in given.accel)]
-    parts = [given.sensor or ""] + ([f"stated: {', '.join(stated)}"] if stated else [])
-    return "; ".join(p for p in parts if p)
 
 
 def headline(result: AlignmentRun) -> str:
@@ -546,43 +489,33 @@ def key_figures(result: AlignmentRun) -> tuple[KeyFigure, ...]:
     """Return the key figures at the top of the page."""
     out = []
     for k in ORDER:
-        said = angle_bound(result.end, k)
-        out.append(
-            KeyFigure(
-                EULER[k].capitalize(),
-                said,
-                f"no 95{GAP}% bound" if said == NOT_KNOWN else _bound_of(result, k),
-                f"at the end; at the start {angle_bound(result.start, k)}",
-            )
-        )
+        said, half = angle_bound(result.end, k), TWO_SIDED_95 * float(result.end.sd_deg[k])
+        bound = f"no 95{GAP}% bound"
+        if said != NOT_KNOWN and not bounds_hold(result):
+            bound = f"the record contradicts the 95{GAP}% bound"
+        elif said != NOT_KNOWN:
+            sd = plain(float(result.end.sd_deg[k]), decimals(half, least=1, most=5))
+            bound = f"95{GAP}% bound; standard deviation {sd}°"
+        note = f"at the end; at the start {angle_bound(result.start, k)}"
+        out.append(KeyFigure(EULER[k].capitalize(), said, bound, note))
     return tuple(out)
-
-
-def _bound_of(result: AlignmentRun, which: int) -> str:
-    if not bounds_hold(result):
-        return f"the record contradicts the 95{GAP}% bound"
-    sd = float(result.end.sd_deg[which])
-    places = decimals(TWO_SIDED_95 * sd, least=1, most=5)
-    return f"95{GAP}% bound; standard deviation {plain(sd, places)}°"
 
 
 def limits(result: AlignmentRun) -> tuple[tuple[str, str], ...]:
     """Return the limiting error sources and their remedies."""
-    site = result.site
     gyro, accel = prior_sd(result)
-    c_nb = _mean_attitude(result)
-    out = [_heading_limit(result, float(np.linalg.norm(c_nb[1] * gyro)))]
-    g = float(np.linalg.norm(site.gravity))
-    level = c_nb[:2] * accel
-    tilt = float(np.linalg.norm(level, axis=1).max())
-    out.append(
+    middle = values_of(result.attitude, QUATERNION)[len(result.attitude) // 2]
+    c_nb = rotation.dcm_from_quaternion(middle)
+    tilt = float(np.linalg.norm(c_nb[:2] * accel, axis=1).max())
+    g = float(np.linalg.norm(result.site.gravity))
+    return (
+        _heading_limit(result, float(np.linalg.norm(c_nb[1] * gyro))),
         (
             "Accelerometer bias limits roll and pitch",
             f"one standard deviation of bias, scale factor and misalignment, {force_words(tilt)}, "
             f"is {small(math.degrees(tilt / g))}° of tilt; at one attitude they are not separable.",
-        )
+        ),
     )
-    return tuple(out)
 
 
 def _heading_limit(result: AlignmentRun, east: float) -> tuple[str, str]:
@@ -594,21 +527,18 @@ def _heading_limit(result: AlignmentRun, east: float) -> tuple[str, str]:
         f"deviation of the gyro errors {rate_words(east)}"
     )
     if coarse.method == "levelling":
+        other = "take it from GNSS fixes while driving (gnss_course)."
+        if across > east:
+            other = "determine it by these gyros (inertial_frame)."
         return (
             "The heading was not determined",
             f"leveling gives roll and pitch only; {hidden}: state the heading (known_heading), "
-            + (
-                "or determine it by these gyros (inertial_frame)."
-                if across > east
-                else "or take it from GNSS fixes while driving (gnss_course)."
-            ),
+            f"or {other}",
         )
     if coarse.heading_given and not across > east:
         told = "GNSS course" if coarse.method == "gnss_course" else "stated heading"
-        return (
-            f"The heading is as good as the {told}",
-            f"{hidden}: the gyros cannot find north.",
-        )
+        said = f"{hidden}: the gyros cannot find north."
+        return f"The heading is as good as the {told}", said
     part = math.degrees(east / across) if across > 0 else math.inf
     told = (
         f"one standard deviation of bias, scale factor and misalignment about east, "
@@ -629,11 +559,6 @@ def prior_sd(result: AlignmentRun) -> tuple[Array, Array]:
     return resting_sd(result.sensors, rate, force)
 
 
-def _mean_attitude(result: AlignmentRun) -> Array:
-    middle = values_of(result.attitude, QUATERNION)[len(result.attitude) // 2]
-    return rotation.dcm_from_quaternion(middle)
-
-
 # Tables of an alignment: attitude, sensor errors, and method.
 
 
@@ -645,26 +570,17 @@ def answer_table(result: AlignmentRun) -> TableBlock:
     """Attitude at start and end from both alignments."""
     known = answer_error(result)
     columns = ["", "start", "end", "coarse alone"]
+    found = (result.start, result.end, result.coarse)
+    rows = [[EULER[k], *(angle_bound(one, k) for one in found)] for k in ORDER]
+    rows.append(["time", *(instant(one.time) for one in found)])
     if known is not None:
         columns.append(f"end − {known[0]}")
-    rows = []
-    for k in ORDER:
-        row = [
-            EULER[k],
-            angle_bound(result.start, k),
-            angle_bound(result.end, k),
-            angle_bound(result.coarse, k),
-        ]
-        if known is not None:
-            row.append(
-                about(float(known[1][k]), TWO_SIDED_95 * known[2], "°")
-                if known[2]
-                else f"{plain(float(known[1][k]), 4)}°"
-            )
-        rows.append(tuple(row))
-    time = ("time", *(instant(a.time) for a in (result.start, result.end, result.coarse)))
-    rows.append((*time, "") if known is not None else time)
-    return TableBlock(tuple(columns), tuple(rows), text=(0,), strong=(0,))
+        for row, k in zip(rows, ORDER, strict=False):
+            off = float(known[1][k])
+            half = TWO_SIDED_95 * known[2]
+            row.append(about(off, half, "°") if known[2] else f"{plain(off, 4)}°")
+        rows[-1].append("")
+    return TableBlock(tuple(columns), tuple(map(tuple, rows)), strong=(0,))
 
 
 def bias_table(result: AlignmentRun) -> TableBlock | None:
@@ -679,28 +595,18 @@ def bias_table(result: AlignmentRun) -> TableBlock | None:
         ("accelerometer", end.accel_bias, end.accel_bias_sd, accel, MICRO_G, "µg"),
     ):
         assert bias is not None and sd is not None
-        for k, axis in enumerate(("x, forward", "y, right", "z, down")):
+        for k, axis in enumerate(_NAMES):
             known = 1.0 - float(sd[k] / prior[k]) if prior[k] > 0 else 0.0
             rows.append(
                 (
                     f"{name} {axis}",
                     about(factor * float(bias[k]), TWO_SIDED_95 * factor * float(sd[k]), unit),
                     plus_minus(TWO_SIDED_95 * factor * float(prior[k]), unit),
-                    _found(known),
+                    "no" if known < 0.1 else "yes" if known > 0.7 else "partly",
                 )
             )
-    return TableBlock(
-        ("sensor", "estimate", "before", "observable"),
-        tuple(rows),
-        text=(0, 3),
-        caption="95 % bounds. Another attitude would make the others observable.",
-    )
-
-
-def _found(share: float) -> str:
-    if share < 0.1:
-        return "no"
-    return "yes" if share > 0.7 else "partly"
+    caption = "95 % bounds. Another attitude would make the others observable."
+    return table_of("sensor | estimate | before | observable", rows, caption, text=(0, 3))
 
 
 def readiness_table(result: AlignmentRun) -> TableBlock:
@@ -709,12 +615,12 @@ def readiness_table(result: AlignmentRun) -> TableBlock:
     whole = float(result.imu.index[-1] - result.imu.index[0])
     times = [t for t in SHOWN if t < 0.97 * whole] + [whole]
     rows = []
+    tables = [("coarse", found.coarse), ("fine", found.fine)]
+    tables = [(name, table) for name, table in tables if not table.empty]
     for time in times:
         cells = [f"{time:.0f} s"]
-        for table in (found.coarse, found.fine):
+        for _, table in tables:
             for names in (("heading_sd",), ("roll_sd", "pitch_sd")):
-                if table.empty:
-                    continue
                 at = index_of(table)
                 sizes = table[list(names)].to_numpy().max(axis=1)
                 inside = at[0] <= time * 1.001
@@ -723,11 +629,11 @@ def readiness_table(result: AlignmentRun) -> TableBlock:
                 value = np.exp(np.interp(np.log(time), where, np.log(sizes))) if inside else np.nan
                 cells.append(_bound(TWO_SIDED_95 * value, names[0]))
         rows.append(tuple(cells))
-    columns = ["after"]
-    for name, table in (("coarse", found.coarse), ("fine", found.fine)):
-        if not table.empty:
-            columns += [f"{name}: heading ±", f"{name}: level ±"]
-    return TableBlock(tuple(columns), tuple(rows), text=(0,))
+    columns = [
+        "after",
+        *(f"{name}: {what} ±" for name, _ in tables for what in ("heading", "level")),
+    ]
+    return TableBlock(tuple(columns), tuple(rows))
 
 
 def _bound(half: float, name: str) -> str:
@@ -747,12 +653,11 @@ _TURN_WORDS = {
 
 def turn_table(result: AlignmentRun) -> TableBlock | None:
     """Predicted accuracy after a turn and a further stationary stretch, best heading first."""
-    if not result.manoeuvres:
-        return None
-    rows = []
+    rows, rest = [], 0.0
     for one in result.manoeuvres:
         gyro = TWO_SIDED_95 * DEG_PER_HOUR * float(np.max(one.gyro_bias_sd))
         accel = TWO_SIDED_95 * MICRO_G * float(np.max(one.accel_bias_sd))
+        rest = rest or one.rest
         rows.append(
             (
                 _TURN_WORDS[one.name],
@@ -762,10 +667,12 @@ def turn_table(result: AlignmentRun) -> TableBlock | None:
                 f"{plain(accel, 0 if accel >= 10.0 else 1)} µg",
             )
         )
-    columns = ("first", "heading ±", "level ±", "worst gyro ±", "worst accelerometer ±")
-    rest = result.manoeuvres[0].rest
-    caption = f"Predicted 95 % bounds after a further rest of {rest:.0f} s."
-    return TableBlock(columns, tuple(rows), text=(0,), caption=caption, strong=(0,))
+    return table_of(
+        "first | heading ± | level ± | worst gyro ± | worst accelerometer ±",
+        rows,
+        f"Predicted 95 % bounds after a further rest of {rest:.0f} s.",
+        strong=(0,),
+    )
 
 
 def method_rows(result: AlignmentRun) -> tuple[tuple[str, str], ...]:
@@ -773,11 +680,8 @@ def method_rows(result: AlignmentRun) -> tuple[tuple[str, str], ...]:
     spec = result.spec
     rows = [("Record", f"{result.source.name}: {result.source.what}")]
     if result.prefilter is not None:
-        report = result.prefilter
-        replaced = len(report.replaced)
-        rows.append(
-            ("Pre-filter", f"{spec.prefilter.kind}, {replaced} samples replaced as outliers")
-        )
+        replaced = f"{len(result.prefilter.replaced)} samples replaced as outliers"
+        rows.append(("Pre-filter", f"{spec.prefilter.kind}, {replaced}"))
     length = spec.coarse.duration_s
     over = "over the whole record" if length is None else f"over the first {length:g} s"
     rows.append(("Coarse alignment", f"{spec.coarse.kind}, {over}"))

@@ -8,26 +8,28 @@ from typing import Any
 
 import numpy as np
 
-from strapdown import __version__
 from strapdown.bundle import write_json
 from strapdown.config.logs import AllanSpec
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.formats import csv
-from strapdown.report.chart import AXIS_COLOURS, Chart, Line, Panel
+from strapdown.report.chart import AXIS_COLOURS, Chart, Line, Panel, dots
 from strapdown.report.document import (
     Document,
     Items,
     Paragraph,
     TableBlock,
+    document_of,
     findings_list,
+    listed,
     paragraph,
     run_again,
     section,
+    table_of,
 )
 from strapdown.report.report_bundle import bundle_by_specification, finite, with_page
 from strapdown.report.values import duration_words
 from strapdown.sensors.bridge import target_of
-from strapdown.sensors.noise_terms import ChannelNoise, NoiseTerm
+from strapdown.sensors.noise_terms import NoiseTerm
 from strapdown.systems.allan_run import AllanRun, run_allan
 from strapdown.tables import ACCEL, GYRO
 
@@ -83,12 +85,7 @@ def allan_json(result: AllanRun) -> dict[str, Any]:
     channels = {
         channel: {
             "terms": {
-                one.name: {
-                    "value": one.value,
-                    "low": one.low,
-                    "high": one.high,
-                    "observable": one.observable,
-                }
+                one.name: {k: getattr(one, k) for k in ("value", "low", "high", "observable")}
                 for one in noise.terms
             },
             "model": dict(noise.model),
@@ -137,7 +134,8 @@ def headline(result: AllanRun) -> str:
         noise = [result.noise[c] for c in channels if c in result.noise]
         if not noise:
             continue
-        seen = [t for t in SHOWN if any(_observable(one, t) for one in noise)]
+        observable = {term.name for one in noise for term in one.terms if term.observable}
+        seen = [name for name in SHOWN if name in observable]
         kinds.append(f"{word} {', '.join(seen)}")
     length = duration_words(result.length)
     if len(result.stretches) > 1:
@@ -147,14 +145,12 @@ def headline(result: AllanRun) -> str:
     )
 
 
-def _observable(noise: ChannelNoise, name: str) -> bool:
-    return any(one.name == name and one.observable for one in noise.terms)
-
-
 def term_tables(result: AllanRun) -> list[TableBlock]:
     """Return a table of the terms of each triad; the last with the caption."""
     tables = []
-    for k, (title, channels) in enumerate((("Gyros", GYRO), ("Accelerometers", ACCEL))):
+    triads = [("Gyros", GYRO), ("Accelerometers", ACCEL)]
+    used = [any(c in result.noise for c in channels) for _, channels in triads]
+    for k, (title, channels) in enumerate(triads):
         noise = [result.noise[c] for c in channels if c in result.noise]
         if not noise:
             continue
@@ -165,10 +161,8 @@ def term_tables(result: AllanRun) -> list[TableBlock]:
             if any(one is not None for one in found):
                 cells = tuple("–" if one is None else _cell(one, factor) for one in found)
                 rows.append((f"{name}  {words}", unit, *cells))
-        columns = (title, "unit", "x", "y", "z")
-        tables.append(TableBlock(columns, tuple(rows), text=(0, 1)))
-    last = tables[-1]
-    tables[-1] = TableBlock(last.columns, last.rows, text=(0, 1), caption=CAPTION)
+        caption = CAPTION if not any(used[k + 1 :]) else ""
+        tables.append(TableBlock((title, "unit", *"xyz"), tuple(rows), (0, 1), caption))
     return tables
 
 
@@ -198,19 +192,13 @@ def parameter_table(result: AllanRun) -> TableBlock | None:
     if result.spec.target is None:
         return None
     name, target = target_of(result.spec.target)
-    rows = tuple(
-        (
-            str(row["parameter"]),
-            str(row["triad"]),
-            str(row["unit"]),
-            *(f"{row[axis]:.4g}" for axis in "xyz"),
-        )
-        for row in result.parameters(name).to_dict("records")
-    )
+    rows = []
+    for row in result.parameters(name).to_dict("records"):
+        words = (str(row[key]) for key in ("parameter", "triad", "unit"))
+        rows.append((*words, *(f"{row[axis]:.4g}" for axis in "xyz")))
     note = f" {target.note[:1].upper()}{target.note[1:]}." if target.note else ""
     caption = f"{target.title}, by {target.source}.{note}"
-    columns = (name, "triad", "unit", "x", "y", "z")
-    return TableBlock(columns, rows, text=(0, 1, 2), caption=caption)
+    return table_of((name, "triad", "unit", *"xyz"), rows, caption, text=(0, 1, 2))
 
 
 # Page and chart.
@@ -226,7 +214,7 @@ def allan_document(result: AllanRun, name: str = "") -> Document:
         for key, title in TARGETS.items()
         if key != "strapdown"
     )
-    sections = [
+    sections = (
         section("deviations", "Allan deviations", allan_chart(result)),
         section("bridge", "For another program", chosen, Items(rows), folded=chosen is None),
         section(
@@ -247,28 +235,29 @@ def allan_document(result: AllanRun, name: str = "") -> Document:
             paragraph(result.sensor_text(), "mono"),
             folded=True,
         ),
-        section("method", "Method", Items(tuple(("", text) for text in METHOD)), folded=True),
+        section("method", "Method", listed(METHOD), folded=True),
         section("again", "Check this folder", *run_again(name)),
-    ]
-    facts = (
-        *(
+    )
+    good = not result.findings
+    return document_of(
+        result.name,
+        "Noise of the sensor",
+        (
             ("Stationary", f"{one.name}, {one.start:.6g} s to {one.end:.6g} s")
             for one in result.stretches
         ),
-        ("Software", f"strapdown {__version__}"),
+        (
+            Paragraph(headline(result), "lead" if good else "warning"),
+            *term_tables(result),
+            None if good else findings_list(result.findings, "cli"),
+        ),
+        sections,
+        links=(
+            ("allan.json", "terms with their intervals, SI"),
+            ("deviations.csv", "deviations by averaging time, SI"),
+            ("sensor.toml", "the sensor, for --sensor"),
+        ),
     )
-    good = not result.findings
-    front = (
-        Paragraph(headline(result), "lead" if good else "warning"),
-        *term_tables(result),
-        *(() if good else (findings_list(result.findings, "cli"),)),
-    )
-    links = (
-        ("allan.json", "terms with their intervals, SI"),
-        ("deviations.csv", "deviations by averaging time, SI"),
-        ("sensor.toml", "the sensor, for --sensor"),
-    )
-    return Document(result.name, "Noise of the sensor", facts, front, tuple(sections), links=links)
 
 
 def allan_chart(result: AllanRun, kind: str = "allan") -> Chart:
@@ -285,7 +274,7 @@ def allan_chart(result: AllanRun, kind: str = "allan") -> Chart:
             tau, axis = table["tau"].to_numpy(), channel[-1]
             values = factor * table[kind].to_numpy()
             if kind == "allan":
-                lines.append(Line(f"{axis}", tau, values, colour, points=True, size=4.0))
+                lines.append(dots(axis, tau, values, colour, size=4.0))
                 model = factor * table["model"].to_numpy()
                 lines.append(Line(f"{axis}, fitted", tau, model, colour, width=1.0))
             else:

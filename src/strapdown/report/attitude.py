@@ -31,26 +31,7 @@ def write_attitude(
     force: bool = False,
     png: bool = False,
 ) -> Seal:
-    """Write a bench as a sealed bundle.
-
-    Parameters
-    ----------
-    out : str or Path
-        Folder to create.
-    report : bool
-        Whether to write the page and the figures.
-    force : bool
-        Overwrite an existing bundle.
-    png : bool
-        Also write each figure as PNG.
-
-    Raises
-    ------
-    ConfigError
-        `out` exists and may not be replaced.
-    DataError
-        An input has changed since it was read.
-    """
+    """Write a bench as a sealed bundle; arguments and errors: as of `AttitudeComparison.save`."""
     seals: list[Seal] = []
     with write_bundle(
         Path(out),
@@ -68,9 +49,22 @@ def write_attitude(
             name, angles = run.algorithm.replace(",", " "), run.attitude
             columns |= {f"{name} {q}": np.round(angles[q].to_numpy(), 9) for q in QUATERNION}
             columns |= {f"{name} {e}_deg": np.round(angles[e].to_numpy(), 6) for e in EULER}
-        csv.write(folder / "attitude.csv", columns, as_comments(words.CONVENTIONS))
+        conventions = as_comments(words.CONVENTIONS)
+        csv.write(folder / "attitude.csv", columns, conventions)
         if len(bench.sweep):
-            _write_sweep(bench, folder / "sweep.csv")
+            columns = {str(name): bench.sweep[name].to_numpy() for name in bench.sweep.columns}
+            for name, values in columns.items():
+                if values.dtype.kind == "f":
+                    # Missing values are written as empty fields, not as NaN.
+                    known = [None if np.isnan(v) else v for v in values.tolist()]
+                    columns[name] = np.array(known, dtype=object)
+            comments = {
+                "meaning": "drop: samples are left out; sum: increments are summed",
+                "error_deg": "what the answer judges: against the truth, else at the reference "
+                "points, else own_deg",
+                "own_deg": share_basis(bench),
+            }
+            csv.write(folder / "sweep.csv", columns, comments | conventions)
         if report:
             from strapdown.report.attitude_charts import charts
             from strapdown.report.attitude_document import attitude_document
@@ -82,28 +76,6 @@ def write_attitude(
             for chart in drawn if png else ():
                 ChartFigure(chart).save(folder / "figures" / f"{chart.slug}.png")
     return seals[0]
-
-
-def _write_sweep(bench: AttitudeComparison, path: Path) -> None:
-    """Write the errors at every rate; unknown values are empty fields."""
-    columns: dict[str, NDArray[Any]] = {}
-    for name in bench.sweep.columns:
-        values = bench.sweep[name].to_numpy()
-        if values.dtype.kind == "f":
-            # Missing values are written as empty fields, not as NaN.
-            values = np.array([None if np.isnan(v) else v for v in values.tolist()], dtype=object)
-        columns[str(name)] = values
-    csv.write(
-        path,
-        columns,
-        {
-            "meaning": "drop: samples are left out; sum: increments are summed",
-            "error_deg": "what the answer judges: against the truth, else at the reference "
-            "points, else own_deg",
-            "own_deg": share_basis(bench),
-        }
-        | as_comments(words.CONVENTIONS),
-    )
 
 
 # Plain data of the attitude bench.
@@ -134,12 +106,9 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
     clock, budget, three = bench.clock, bench.budget, ("final", "rms", "max")
     shares = {
         s.algorithm: {
-            key: None if values is None else dict(zip(three, values, strict=True))
-            for key, values in (
-                ("own_deg", s.own_deg),
-                ("sensor_deg", s.sensor_deg),
-                ("single_deg", s.single_deg),
-            )
+            key: values and dict(zip(three, values, strict=True))
+            for key in ("own_deg", "sensor_deg", "single_deg")
+            for values in (getattr(s, key),)
         }
         for s in bench.shares
     }
@@ -158,9 +127,8 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
             "lost_samples": clock.lost,
             "gaps": [{"start_s": g.start, "end_s": g.end} for g in clock.gaps],
         },
-        "sensor_error_parts": None
-        if budget is None
-        else {
+        "sensor_error_parts": budget
+        and {
             "delay_s": budget.delay_s,
             "delay_sd_s": budget.delay_sd,
             "drift_ppm": budget.drift_ppm,
@@ -186,9 +154,8 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
         ],
         "share_basis": share_basis(bench),
         "sweep": bench.sweep.to_dict("records"),
-        "trials": None
-        if bench.trials is None
-        else {
+        "trials": bench.trials
+        and {
             "names": list(bench.trials.names),
             "errors": bench.trials.errors.to_dict("records"),
             "ranking": bench.trials.ranking.to_dict("records"),
@@ -199,8 +166,8 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
                 "aiding": peer.aiding,
                 "final": _final(peer.attitude.iloc[-1], float(peer.attitude.index[-1])),
                 "scores": [_score(s) for s in peer.scores],
-                "errors": None if peer.errors is None else vars(peer.errors),
-                "cost": None if peer.cost is None else vars(peer.cost),
+                "errors": peer.errors and vars(peer.errors),
+                "cost": peer.cost and vars(peer.cost),
                 "single_precision_deg": peer.single_deg,
                 "lowest_rate_hz": peer.lowest_hz,
                 "lowest_rate_of_roll_and_pitch_hz": peer.lowest_level_hz,
@@ -209,12 +176,10 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
         ],
         "positions": [asdict(place) for place in bench.places],
         "offered_references": [asdict(offer) for offer in bench.offers],
-        "second_log": None
-        if bench.second is None
-        else {key + _UNITS.get(key, ""): value for key, value in asdict(bench.second).items()},
-        "sampling_error_deg": None
-        if bench.sampling_error_deg is None
-        else dict(zip(("final", "max"), bench.sampling_error_deg, strict=True)),
+        "second_log": bench.second
+        and {key + _UNITS.get(key, ""): value for key, value in asdict(bench.second).items()},
+        "sampling_error_deg": bench.sampling_error_deg
+        and dict(zip(("final", "max"), bench.sampling_error_deg, strict=True)),
         "largest_difference_deg": {
             name: {other: float(v) for other, v in row.items()}
             for name, row in bench.differences_deg.iterrows()
@@ -244,13 +209,6 @@ def _final(row: Any, time: float) -> dict[str, float]:
 
 
 def _score(score: Score) -> dict[str, Any]:
-    return {
-        "against": score.against,
-        "time_s": score.time,
-        "error_deg": score.error_deg,
-        "rms_deg": score.rms_deg,
-        "max_deg": score.max_deg,
-        "turned_deg": score.turned_deg,
-        "expected_deg": score.expected_deg,
-        "sd_deg": score.sd_deg,
-    }
+    data = {"against": score.against, "time_s": score.time}
+    keys = ("error_deg", "rms_deg", "max_deg", "turned_deg", "expected_deg", "sd_deg")
+    return data | {key: getattr(score, key) for key in keys}

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 
 from strapdown.attitude_comparison.comparison import AttitudeComparison
-from strapdown.attitude_comparison.references import PeerRun
 from strapdown.evaluation.differences import error_angles
 from strapdown.report.attitude_words import (
     MEANINGS,
@@ -34,6 +33,7 @@ from strapdown.report.chart import (
     Panel,
     break_jumps,
     curve,
+    dots,
     look,
 )
 from strapdown.report.plan import place_labels
@@ -104,28 +104,19 @@ def _gyro(bench: AttitudeComparison) -> Chart:
 
 def _attitude(bench: AttitudeComparison) -> Chart:
     panels = []
+    known = bench.references[bench.references["kind"] == "known"]
     for angle in EULER:
         lines = [
             _of_run(bench, k, run.attitude.index, break_jumps(run.attitude[angle].to_numpy()))
             for k, run in enumerate(bench.runs)
         ]
-        if bench.truth is not None:
-            lines.append(
-                curve(
-                    "truth",
-                    index_of(bench.truth),
-                    break_jumps(bench.truth[angle].to_numpy()),
-                    BLACK,
-                    "dot",
-                    1.0,
-                )
-            )
-        known = bench.references[bench.references["kind"] == "known"]
+        if (truth := bench.truth) is not None:
+            values = break_jumps(truth[angle].to_numpy())
+            lines.append(curve("truth", index_of(truth), values, BLACK, "dot", 1.0))
         if len(known):
-            at = known["time"].to_numpy(dtype=np.float64)
             value = known[angle].to_numpy(dtype=np.float64)
             shown = value % 360.0 if angle == "heading" else value
-            lines.append(Line("known", at, shown, BLACK, points=True))
+            lines.append(dots("known", known["time"], shown, BLACK))
         panels.append(Panel(f"{angle}, deg", tuple(lines)))
     return Chart(
         "attitude",
@@ -148,8 +139,7 @@ def _error(bench: AttitudeComparison) -> Chart:
     return Chart(
         "error",
         "Error against the truth",
-        "Rotation angle between computed and true attitude. "
-        f"Drawn at {LEAST_WORDS} where it is less.",
+        f"Rotation angle between computed and true attitude. {_DRAWN}",
         _TIME,
         (Panel("error, deg", tuple(lines), log=True),),
         _marks(bench),
@@ -162,12 +152,8 @@ def _reference_error(bench: AttitudeComparison) -> Chart:
         scores = [
             s for s in bench.scores if s.algorithm == run.algorithm and s.reference is not None
         ]
-        at = np.array([s.time for s in scores])
-        errors = np.array([s.error_deg for s in scores])
-        style = look(k)
-        lines.append(
-            Line(run.algorithm, at, errors, style["colour"], points=True, symbol=style["symbol"])
-        )
+        points = [s.time for s in scores], [s.error_deg for s in scores]
+        lines.append(dots(run.algorithm, *points, look(k)["colour"], look(k)["symbol"]))
     return Chart(
         "reference-error",
         "Error at the reference points",
@@ -180,21 +166,15 @@ def _reference_error(bench: AttitudeComparison) -> Chart:
 
 def _difference(bench: AttitudeComparison) -> Chart:
     base = next((r for r in bench.runs if r.algorithm == "quaternion"), bench.runs[-1])
-    lines = [
-        _of_run(
-            bench,
-            k,
-            run.attitude.index,
-            np.maximum(error_angles(run.attitude, base.attitude).to_numpy(), LEAST_ERROR),
-        )
-        for k, run in enumerate(bench.runs)
-        if run is not base
-    ]
+    lines = []
+    for k, run in enumerate(bench.runs):
+        if run is not base:
+            apart = np.maximum(error_angles(run.attitude, base.attitude).to_numpy(), LEAST_ERROR)
+            lines.append(_of_run(bench, k, run.attitude.index, apart))
     return Chart(
         "difference",
         f"Difference from {base.algorithm}",
-        "Rotation angle between the algorithms on the same samples. "
-        f"Drawn at {LEAST_WORDS} where it is less.",
+        f"Rotation angle between the algorithms on the same samples. {_DRAWN}",
         _TIME,
         (Panel("difference, deg", tuple(lines), log=True),),
     )
@@ -204,7 +184,8 @@ def _difference(bench: AttitudeComparison) -> Chart:
 
 
 # A logarithmic axis has no zero; smaller values are drawn here.
-LEAST_ERROR, LEAST_WORDS = 1e-6, "10⁻⁶°"
+LEAST_ERROR = 1e-6
+_DRAWN = "Drawn at 10⁻⁶° where it is less."
 _FAINT = "#c3c9d0"
 
 
@@ -214,8 +195,10 @@ def _shown(values: object) -> Array:
     return np.where(np.isnan(array), np.nan, np.maximum(array, LEAST_ERROR))
 
 
-def _tolerance(bench: AttitudeComparison) -> str:
-    return f"tolerance {bench.answer.tolerance_deg:g}°"
+def _tolerance(bench: AttitudeComparison) -> tuple[float, str]:
+    """Where the tolerance is drawn, and its label."""
+    limit = bench.answer.tolerance_deg
+    return max(limit, LEAST_ERROR), f"tolerance {limit:g}°"
 
 
 def _cost(bench: AttitudeComparison) -> Chart:
@@ -225,7 +208,7 @@ def _cost(bench: AttitudeComparison) -> Chart:
     total = _shown([errors.get(name, np.nan) for name in names])
     shares = {share.algorithm: share.own_deg[2] for share in bench.shares}
     own = _shown([shares.get(name, np.nan) for name in names])
-    tolerance = max(bench.answer.tolerance_deg, LEAST_ERROR)
+    tolerance = Level(*_tolerance(bench))
     lines = []
     # Pareto-optimal points, cheapest first.
     front: list[int] = []
@@ -242,7 +225,7 @@ def _cost(bench: AttitudeComparison) -> Chart:
         lines.append(Line("", np.repeat(cycles, 3), stems, _FAINT, width=1.0, legend=False))
     known = ~np.isnan(total)
     obstacles = np.column_stack([cycles, own])[~np.isnan(own)] if judged else np.empty((0, 2))
-    level = np.array([[float(np.median(cycles)), tolerance]])
+    level = np.array([[float(np.median(cycles)), tolerance.y]])
     places = place_labels(
         np.log10(cycles[known]),
         np.log10(total[known]),
@@ -251,24 +234,12 @@ def _cost(bench: AttitudeComparison) -> Chart:
     )
     for k, place in zip(np.flatnonzero(known), places, strict=True):
         style, at, name = look(int(k)), cycles[k : k + 1], names[k]
-        point = Line(
-            name,
-            at,
-            total[k : k + 1],
-            style["colour"],
-            points=True,
-            symbol=style["symbol"],
-            size=12,
-            labels=(name,),
-            places=(place,),
-            legend=False,
-        )
-        lines.append(point)
+        drawn = style["colour"], style["symbol"]
+        point = dots(name, at, total[k : k + 1], *drawn, 12, labels=(name,), places=(place,))
+        lines.append(replace(point, legend=False))
         if judged:
-            alone, error = f"{name}, algorithm error", own[k : k + 1]
-            lines.append(
-                replace(point, name=alone, y=error, size=10, hollow=True, labels=(), places=())
-            )
+            alone = f"{name}, algorithm error"
+            lines.append(dots(alone, at, own[k : k + 1], *drawn, 10, hollow=True, legend=False))
     return Chart(
         "cost",
         "Cost against error",
@@ -278,80 +249,47 @@ def _cost(bench: AttitudeComparison) -> Chart:
             else "Algorithm error, without a reference. "
         )
         + "Largest rotation angle at the log's own rate. Cost: operations per sample, weighted by "
-        f"their duration on a Cortex-M4F. Drawn at {LEAST_WORDS} where it is less.",
+        f"their duration on a Cortex-M4F. {_DRAWN}",
         "cost, Cortex-M4F cycles per sample",
-        (
-            Panel(
-                "error, deg", tuple(lines), log=True, levels=(Level(tolerance, _tolerance(bench)),)
-            ),
-        ),
+        (Panel("error, deg", tuple(lines), log=True, levels=(tolerance,)),),
         log_x=True,
     )
 
 
 def _sweep(bench: AttitudeComparison) -> Chart:
     answer = bench.answer
-    meanings = [m for m in MEANINGS if (bench.sweep["meaning"] == m).any()]
     judged = bool(bench.scores)
     panels = []
-    for meaning in meanings:
+    for meaning, title in MEANINGS.items():
         part = bench.sweep[bench.sweep["meaning"] == meaning].sort_values("rate_hz")
-        columns = (part[c].tolist() for c in ("algorithm", "rate_hz", "own_deg", "error_deg"))
-        cells = list(zip(*columns, strict=True))
+        if not len(part):
+            continue
         lines = []
         for k, run in enumerate(bench.runs):
-            rows = np.array([cell[1:] for cell in cells if cell[0] == run.algorithm])
-            if not rows.size:
+            rows = part[part["algorithm"] == run.algorithm]
+            if not len(rows):
                 continue
-            rate, own, error = rows.T.copy()
+            rate = rows["rate_hz"].to_numpy(dtype=np.float64)
             style = look(k)
+            drawn = style["colour"], style["dash"]
             if judged:
-                lines.append(
-                    Line(
-                        f"{run.algorithm}, algorithm error",
-                        rate,
-                        _shown(own),
-                        style["colour"],
-                        style["dash"],
-                        width=0.7,
-                        legend=False,
-                    )
-                )
+                name, own = f"{run.algorithm}, algorithm error", _shown(rows["own_deg"])
+                lines.append(Line(name, rate, own, *drawn, width=0.7, legend=False))
+            # Decreasing widths keep coinciding curves visible.
+            width = max(1.4, 4.4 - 0.4 * k)
+            error, marked = _shown(rows["error_deg"]), style["symbol"]
             lines.append(
-                Line(
-                    run.algorithm,
-                    rate,
-                    _shown(error),
-                    style["colour"],
-                    style["dash"],
-                    # Decreasing widths keep coinciding curves visible.
-                    width=max(1.4, 4.4 - 0.4 * k),
-                    symbol=style["symbol"],
-                    dots=True,
-                    size=7,
-                )
+                Line(run.algorithm, rate, error, *drawn, width, symbol=marked, dots=True, size=7)
             )
-        chosen = part[
-            (part["algorithm"] == answer.algorithm)
-            & np.isclose(part["rate_hz"], np.nan if answer.rate_hz is None else answer.rate_hz)
-        ]
+        at = np.nan if answer.rate_hz is None else answer.rate_hz
+        chosen = part[(part["algorithm"] == answer.algorithm) & np.isclose(part["rate_hz"], at)]
         if answer.meaning in (None, meaning) and len(chosen):
-            lines.append(
-                Line(
-                    "the answer",
-                    chosen["rate_hz"].to_numpy(dtype=np.float64),
-                    _shown(chosen["error_deg"]),
-                    BLACK,
-                    points=True,
-                    symbol="circle",
-                    size=19,
-                    hollow=True,
-                )
-            )
-        level = Level(max(answer.tolerance_deg, LEAST_ERROR), _tolerance(bench))
-        label = "error, deg"
-        title = MEANINGS[meaning].capitalize()
-        panels.append(Panel(label, tuple(lines), log=True, title=title, levels=(level,)))
+            point = chosen["rate_hz"], _shown(chosen["error_deg"])
+            lines.append(dots("the answer", *point, BLACK, "circle", 19, hollow=True))
+        levels = (Level(*_tolerance(bench)),)
+        panels.append(
+            Panel("error, deg", tuple(lines), log=True, title=title.capitalize(), levels=levels)
+        )
     return Chart(
         "sweep",
         "Error against rate",
@@ -361,7 +299,7 @@ def _sweep(bench: AttitudeComparison) -> Chart:
             else "Algorithm error at that rate. "
         )
         + "Averaged: as by a sensor of that rate. Left out: as if it were read less often "
-        f"(aliased). Drawn at {LEAST_WORDS} where it is less.",
+        f"(aliased). {_DRAWN}",
         "rate, Hz",
         tuple(panels),
         log_x=True,
@@ -380,15 +318,13 @@ def _share(bench: AttitudeComparison) -> Chart:
     if not np.isnan(sensor).all():
         parts.insert(0, ("of the sensor", sensor, VERMILLION, "square"))
     lines = tuple(
-        Line(name, _shown(values), rows, colour, points=True, symbol=symbol, size=11)
+        dots(name, _shown(values), rows, colour, symbol, 11)
         for name, values, colour, symbol in parts
     )
     return Chart(
         "share",
         "Parts of the error",
-        "Largest rotation angle due to each part. "
-        + share_basis(bench)
-        + f" Drawn at {LEAST_WORDS} where it is less.",
+        f"Largest rotation angle due to each part. {share_basis(bench)} {_DRAWN}",
         "error, deg",
         (Panel("", lines, categories=names),),
         log_x=True,
@@ -399,34 +335,16 @@ def _trials(bench: AttitudeComparison) -> Chart:
     trials = bench.trials
     assert trials is not None
     names = tuple(str(name) for name in trials.ranking["algorithm"])
-    row_of = {name: k for k, name in enumerate(names)}
     errors = trials.errors[trials.errors["algorithm"].isin(names)]
-    at = np.array([row_of[name] for name in errors["algorithm"]], dtype=np.float64)
+    at = [names.index(name) for name in errors["algorithm"]]
     mean, low, high = (
         _shown(trials.ranking[c].to_numpy()) for c in ("mean_deg", "low_deg", "high_deg")
     )
+    low, high = (np.where(np.isnan(end), mean, end) for end in (low, high))
+    interval, rows = "mean, with its 95 % interval", np.arange(len(names))
     lines = (
-        Line(
-            "trial",
-            _shown(errors["error_deg"].to_numpy()),
-            at,
-            GREY,
-            points=True,
-            symbol="circle",
-            size=7,
-            hollow=True,
-        ),
-        Line(
-            "mean, with its 95 % interval",
-            mean,
-            np.arange(len(names), dtype=np.float64),
-            BLUE,
-            points=True,
-            symbol="diamond",
-            size=11,
-            low=np.where(np.isnan(low), mean, low),
-            high=np.where(np.isnan(high), mean, high),
-        ),
+        dots("trial", _shown(errors["error_deg"]), at, GREY, "circle", 7, hollow=True),
+        dots(interval, mean, rows, BLUE, size=11, low=low, high=high),
     )
     return Chart(
         "trials",
@@ -434,18 +352,33 @@ def _trials(bench: AttitudeComparison) -> Chart:
         "The error that the answer uses, best on top.",
         "error, deg",
         (Panel("", lines, categories=names),),
-        (Mark(max(bench.answer.tolerance_deg, LEAST_ERROR), _tolerance(bench)),),
+        (Mark(*_tolerance(bench)),),
         log_x=True,
     )
 
 
 def _peers(bench: AttitudeComparison) -> Chart:
     alone, aided = like_with_like(bench)
-    errors = full_rate_errors(bench)
-    own = [(name, error, BLUE, "circle") for name, error in errors.items()]
-    panels = [_peer_panel("Gyro alone", own + _rows(alone))]
-    if aided:
-        panels.append(_peer_panel("Aided", _rows(aided, named=True)))
+    own = [(name, error, True) for name, error in full_rate_errors(bench).items()]
+    panels = []
+    for title, ours, peers in (("Gyro alone", own, alone), ("Aided", [], aided)):
+        # Name, largest error, and whether it is of strapdown.
+        rows = list(ours)
+        for peer in peers:
+            name = f"{peer.peer} ({peer.aiding})" if title == "Aided" else peer.peer
+            error = largest_known(peer.scores)
+            rows.append((name, np.nan if error is None else error, peer.cost is not None))
+        lines = []
+        for is_own, colour, symbol, who in (
+            (True, BLUE, "circle", "strapdown"),
+            (False, VERMILLION, "square", "others"),
+        ):
+            if at := [k for k, row in enumerate(rows) if row[2] == is_own]:
+                values = _shown([rows[k][1] for k in at])
+                lines.append(dots(who, values, at, colour, symbol, 11))
+        if rows:
+            categories = tuple(row[0] for row in rows)
+            panels.append(Panel("", tuple(lines), title=title, categories=categories))
     return Chart(
         "peers",
         "Filters and other libraries on the same log",
@@ -453,29 +386,7 @@ def _peers(bench: AttitudeComparison) -> Chart:
         "use an accelerometer or a magnetometer are apart.",
         "error, deg",
         tuple(panels),
-        (Mark(max(bench.answer.tolerance_deg, LEAST_ERROR), _tolerance(bench)),),
+        (Mark(*_tolerance(bench)),),
         log_x=True,
         beside=True,
     )
-
-
-def _rows(peers: list[PeerRun], named: bool = False) -> list[tuple[str, float, str, str]]:
-    rows = []
-    for peer in peers:
-        error = largest_known(peer.scores)
-        name = f"{peer.peer} ({peer.aiding})" if named else peer.peer
-        own = peer.cost is not None
-        look = (BLUE, "circle") if own else (VERMILLION, "square")
-        rows.append((name, np.nan if error is None else error, *look))
-    return rows
-
-
-def _peer_panel(title: str, rows: list[tuple[str, float, str, str]]) -> Panel:
-    lines = []
-    for colour, symbol, who in ((BLUE, "circle", "strapdown"), (VERMILLION, "square", "others")):
-        ours = [k for k, row in enumerate(rows) if row[2] == colour]
-        if ours:
-            values = _shown([rows[k][1] for k in ours])
-            at = np.array(ours, dtype=np.float64)
-            lines.append(Line(who, values, at, colour, points=True, symbol=symbol, size=11))
-    return Panel("", tuple(lines), title=title, categories=tuple(row[0] for row in rows))

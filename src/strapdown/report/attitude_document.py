@@ -8,14 +8,12 @@ from html import escape
 
 import numpy as np
 
-from strapdown import __version__
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.errors import ConfigError, check_choice
 from strapdown.evaluation.differences import attitude_at
 from strapdown.report import attitude_tables as tables
 from strapdown.report import attitude_words as words
 from strapdown.report.attitude_charts import charts
-from strapdown.report.attitude_tables import result_tables
 from strapdown.report.attitude_words import MEANINGS, chosen_run, full_rate_errors, sweep_grid
 from strapdown.report.chart import AXIS_COLOURS, BLACK, GREY, Chart
 from strapdown.report.chart_svg import ChartFigure
@@ -24,23 +22,24 @@ from strapdown.report.document import (
     Block,
     Document,
     Facts,
-    Items,
     KeyFigure,
     KeyFigures,
     Paragraph,
     TableBlock,
-    blocks,
+    document_of,
     findings_list,
+    listed,
     section,
+    table_of,
 )
 from strapdown.report.scene import Scene, SceneBody, SceneLine, SceneWord
+from strapdown.tables import NED
 from strapdown.tables.checks import index_of
 
 
 def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None = None) -> Document:
     """Return the report of a bench; its charts are drawn here unless they are given."""
-    made = {c.slug: c for c in (charts(bench) if drawn is None else drawn)}
-    chart = made.get
+    chart = {c.slug: c for c in (charts(bench) if drawn is None else drawn)}.get
     answer = bench.answer
     # Warnings stand beside the answer; notes and remedies follow below.
     warnings = [
@@ -48,6 +47,7 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
         for f in bench.findings
         if f.severity != "note"
     ]
+    readings = ((r.source, r.quantity, r.unit, words.first_value(r), r.why) for r in bench.readings)
     sections = (
         section(
             "rates",
@@ -56,11 +56,7 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             chart("sweep"),
             *tables.sweep_tables(bench),
         ),
-        section(
-            "results",
-            "Results",
-            *tables.result_tables(bench),
-        ),
+        section("results", "Results", *tables.result_tables(bench)),
         section(
             "log", "Signals and attitude", chart("gyro"), chart("attitude"), body_animation(bench)
         ),
@@ -94,17 +90,12 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             "inputs",
             "Inputs and assumptions",
             Facts(tuple(words.facts(bench))),
-            TableBlock(
-                ("column", "taken as", "unit", "first value", "because"),
-                tuple(
-                    (r.source, r.quantity, r.unit, words.first_value(r), r.why)
-                    for r in bench.readings
-                ),
-                (0, 1, 2, 4),
+            table_of(
+                "column | taken as | unit | first value | because",
+                readings,
+                text=(0, 1, 2, 4),
                 title="How the log was read",
-            )
-            if bench.readings
-            else None,
+            ),
             folded=True,
         ),
         section("conventions", "Conventions", Facts(words.CONVENTIONS), folded=True),
@@ -119,11 +110,11 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             folded=True,
         ),
     )
-    return Document(
+    return document_of(
         bench.source,
         "Comparison of attitude algorithms",
-        (("Software", f"strapdown {__version__}"),),
-        blocks(
+        (),
+        (
             _key_figures(bench),
             Paragraph(answer.sentence, "lead"),
             Paragraph(words.standing(bench)),
@@ -135,7 +126,7 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             ),
         ),
         sections,
-        bench.source,
+        footer=bench.source,
     )
 
 
@@ -144,30 +135,27 @@ def _key_figures(bench: AttitudeComparison) -> KeyFigures | None:
     answer = bench.answer
     if answer.algorithm is None:
         return None
-    alone = answer.verdict == "sensor"  # beside its errors the algorithm's own are small
     names = ("Simplest sufficient algorithm", "Lowest sufficient rate")
-    if alone:
+    whose = "algorithm error, without a reference" if answer.verdict == "own" else "largest error"
+    bound = f"tolerance {answer.tolerance_deg:g}°"
+    if answer.verdict == "sensor":  # beside its errors the algorithm's own are small
         names = ("All that integration needs", "At a rate of")
+        whose, bound = "largest error, the sensor's included", f"beyond the {bound}"
     figures = [KeyFigure(names[0], answer.algorithm, "")]
     rate, meaning, error = answer.rate_hz, answer.meaning, math.nan
     if rate is not None:
         figures.append(KeyFigure(names[1], f"{rate:.4g} Hz", MEANINGS.get(meaning or "", "")))
         grid = sweep_grid(bench, meaning or "drop")
         if rate in grid.columns:
-            errors = grid[rate].to_dict()
-            error = float(errors.get(answer.algorithm, math.nan))
+            error = float(grid[rate].get(answer.algorithm, math.nan))
     if math.isnan(error):
         error = full_rate_errors(bench).get(answer.algorithm, math.nan)
-    whose = "algorithm error, without a reference" if answer.verdict == "own" else "largest error"
-    bound = f"tolerance {answer.tolerance_deg:g}°"
-    if alone:
-        whose, bound = "largest error, the sensor's included", f"beyond the {bound}"
     figures.append(KeyFigure(whose.capitalize(), words.degrees(error), bound))
     return KeyFigures(tuple(figures))
 
 
 def _named_items(title: str, lines: Sequence[str]) -> list[Block]:
-    return [Paragraph(title), Items(tuple(("", line) for line in lines))] if lines else []
+    return [Paragraph(title), listed(lines)] if lines else []
 
 
 # The body in space: a box with its axes among north, east and down, over time.
@@ -200,11 +188,8 @@ def body_animation(bench: AttitudeComparison) -> Animation:
     # Real time for a short log, else the fastest drawable.
     real = 1000.0 * (end - start) / (len(time) - 1)
     frame = max(real, _SHORTEST) if real * (len(time) - 1) <= _AS_IT_WAS else _SHORTEST
-    tips = np.eye(3).tolist()
-    axes = tuple(
-        (name, (tip[0], tip[1], tip[2]), colour)
-        for name, tip, colour in zip(_AXIS_NAMES, tips, AXIS_COLOURS, strict=True)
-    )
+    tips = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    axes = tuple(zip(_AXIS_NAMES, tips, AXIS_COLOURS, strict=True))
     bodies = [SceneBody(_CORNERS, _FACES, _COLOURS, attitude_at(run.attitude, time), axes=axes)]
     if truth is not None and len(truth):
         stamps, ghost = index_of(truth), attitude_at(truth, time)
@@ -212,8 +197,7 @@ def body_animation(bench: AttitudeComparison) -> Animation:
         bodies.append(SceneBody(_CORNERS, _FACES, (BLACK,) * 6, ghost, wire=True))
     tips_ned = ((1.2, 0.0, 0.0), (0.0, 1.2, 0.0), (0.0, 0.0, 1.1))
     lines = [SceneLine("", np.vstack([np.zeros(3), tip]), GREY, 1.0, True) for tip in tips_ned]
-    names = ("north", "east", "down")
-    labels = [SceneWord(name, tip, GREY) for name, tip in zip(names, tips_ned, strict=True)]
+    labels = [SceneWord(name, tip, GREY) for name, tip in zip(NED, tips_ned, strict=True)]
     scene = Scene(
         tuple(bodies),
         tuple(lines),
@@ -293,7 +277,7 @@ def short_html(bench: AttitudeComparison) -> str:
         f"<div><b>{escape(bench.source)}</b></div>",
         f'<p style="font-size:1.25em;margin:.3em 0"><b>{escape(bench.answer.sentence)}</b></p>',
         f'<p style="margin:.3em 0">{escape(words.standing(bench))}</p>',
-        *(_table(table) for table in result_tables(bench)),
+        *map(_table, tables.result_tables(bench)),
     ]
     return "<div>" + "".join(parts) + "</div>"
 
@@ -301,15 +285,11 @@ def short_html(bench: AttitudeComparison) -> str:
 def _table(table: TableBlock) -> str:
     def row(cells: tuple[str, ...], tag: str, bold: bool) -> str:
         weight = ";font-weight:bold" if bold else ""
-        return (
-            "<tr>"
-            + "".join(
-                f'<{tag} style="text-align:{"left" if k in table.text else "right"}{weight}">'
-                f"{escape(cell)}</{tag}>"
-                for k, cell in enumerate(cells)
-            )
-            + "</tr>"
-        )
+        made = ""
+        for k, cell in enumerate(cells):
+            side = "left" if k in table.text else "right"
+            made += f'<{tag} style="text-align:{side}{weight}">{escape(cell)}</{tag}>'
+        return f"<tr>{made}</tr>"
 
     rows = "".join(row(r, "td", k in table.strong) for k, r in enumerate(table.rows))
     note = f"<div><small>{escape(table.caption)}</small></div>" if table.caption else ""

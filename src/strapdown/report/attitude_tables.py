@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from itertools import takewhile
 
+import numpy as np
+
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.attitude_comparison.references import PeerRun
 from strapdown.report.attitude_words import (
@@ -18,7 +20,7 @@ from strapdown.report.attitude_words import (
     source_of,
     sweep_grid,
 )
-from strapdown.report.document import TableBlock
+from strapdown.report.document import TableBlock, table_of
 
 # With more comparisons the error contributions no longer fit in a terminal.
 _MOST_BESIDE = 4
@@ -46,38 +48,37 @@ def result_tables(bench: AttitudeComparison) -> list[TableBlock]:
     if points > _MOST_POINTS:
         at = [f"worst of R1 to R{points}"]
     columns = (["final", "RMS", "largest"] if truth else []) + at
-    parts, cells = _parts(bench)
-    compared, made = [], []
+    parts = _parts(bench)
+    compared, made = {}, {}
     for run in bench.runs:
-        scores = [s for s in bench.scores if s.algorithm == run.algorithm]
+        name = run.algorithm
+        scores = [s for s in bench.scores if s.algorithm == name]
         errors = []
         for s in scores:
             errors += [s.error_deg, s.rms_deg, s.max_deg] if s.against == "truth" else []
         known = [s.error_deg for s in scores if s.reference is not None]
         errors += [max(known)] if len(known) > _MOST_POINTS else known
-        compared.append([*map(degrees, errors), *[_NONE] * (len(columns) - len(errors))])
-        made.append([cells[column].get(run.algorithm, _NONE) for column in parts])
-    names = [run.algorithm for run in bench.runs]
+        compared[name] = [*map(degrees, errors), *[_NONE] * (len(columns) - len(errors))]
+        made[name] = [cells.get(name, _NONE) for cells in parts.values()]
     note = ""
     if bench.shares:
-        sensor = "sensor" in cells
+        sensor = "sensor" in parts
         note = (
-            "alg. error, "
-            + ("sensor, " if sensor else "")
-            + "float32: largest error due to the algorithm at this rate, "
-            + ("to the sensor, " if sensor else "")
-            + f"and to single precision. {share_basis(bench)} cycles: of a Cortex-M4F per sample; "
-            "memory: numbers kept between samples."
+            f"alg. error, {'sensor, ' if sensor else ''}float32: largest error due to the "
+            f"algorithm at this rate, {'to the sensor, ' if sensor else ''}and to single "
+            f"precision. {share_basis(bench)} cycles: of a Cortex-M4F per sample; memory: numbers "
+            "kept between samples."
         )
+    tables = [("Results", [*columns, *parts], {k: compared[k] + made[k] for k in made}, note)]
     if len(columns) > _MOST_BESIDE:
-        tables = [("Results", columns, compared, ""), ("Parts of the error", parts, made, note)]
-    else:
-        rows = [[*left, *right] for left, right in zip(compared, made, strict=True)]
-        tables = [("Results", [*columns, *parts], rows, note)]
+        tables = [
+            ("Results", columns, compared, ""),
+            ("Parts of the error", list(parts), made, note),
+        ]
     return [
         TableBlock(
             ("algorithm", *header),
-            tuple((name, *row) for name, row in zip(names, rows, strict=True)),
+            tuple((name, *row) for name, row in rows.items()),
             caption=caption,
             strong=_named(bench),
             title=title,
@@ -86,15 +87,14 @@ def result_tables(bench: AttitudeComparison) -> list[TableBlock]:
     ]
 
 
-def _parts(bench: AttitudeComparison) -> tuple[list[str], dict[str, dict[str, str]]]:
-    """Columns of the error contributions and costs, and their cells by algorithm."""
+def _parts(bench: AttitudeComparison) -> dict[str, dict[str, str]]:
+    """Columns of the error contributions and costs, each with its cells by algorithm."""
     cells: dict[str, dict[str, str]] = {}
     if bench.shares:
         cells["alg. error"] = {s.algorithm: degrees(s.own_deg[2]) for s in bench.shares}
         if any(s.sensor_deg is not None for s in bench.shares):
             cells["sensor"] = {
-                s.algorithm: degrees(None if s.sensor_deg is None else s.sensor_deg[2])
-                for s in bench.shares
+                s.algorithm: degrees(s.sensor_deg and s.sensor_deg[2]) for s in bench.shares
             }
         if len(bench.sweep):
             # Lowest rate of averaged samples down to which the algorithm error is within tolerance.
@@ -102,37 +102,32 @@ def _parts(bench: AttitudeComparison) -> tuple[list[str], dict[str, dict[str, st
             for name, errors in sweep_grid(bench, "sum", "own_deg").T.items():
                 within = list(takewhile(lambda cell: cell[1] <= limit, errors.items()))
                 lowest[str(name)] = f"{within[-1][0]:.3g} Hz" if within else _NONE
-            cells[f"≤ {limit:g}° to"] = {s.algorithm: lowest[s.algorithm] for s in bench.shares}
+            cells[f"≤ {limit:g}° to"] = lowest
         cells["float32"] = {s.algorithm: degrees(s.single_deg[2]) for s in bench.shares}
     if bench.costs:
         cells["cycles"] = {c.algorithm: number(c.cycles) for c in bench.costs}
         cells["memory"] = {c.algorithm: str(c.memory) for c in bench.costs}
-    return list(cells), cells
+    return cells
 
 
-def condition_table(bench: AttitudeComparison) -> TableBlock:
+def condition_table(bench: AttitudeComparison) -> TableBlock | None:
     """Return the source and the diagnostics of each algorithm."""
-    rows = tuple((r.algorithm, source_of(r), condition(r.diagnostics)) for r in bench.runs)
-    columns = ("algorithm", "source", "diagnostics")
-    return TableBlock(columns, rows, (0, 1, 2), strong=_named(bench), title="The algorithms")
+    rows = ((r.algorithm, source_of(r), condition(r.diagnostics)) for r in bench.runs)
+    columns = "algorithm | source | diagnostics"
+    title = "The algorithms"
+    return table_of(columns, rows, text=(0, 1, 2), strong=_named(bench), title=title)
 
 
 def cost_table(bench: AttitudeComparison) -> TableBlock | None:
     """Return the operations per sample of each algorithm; None if none were counted."""
-    if not bench.costs:
-        return None
-    rows = tuple(
-        (
-            c.algorithm,
-            *(number(v) for v in (c.add, c.multiply, c.divide, c.sqrt, c.trig, c.cycles)),
-            str(c.memory),
-        )
-        for c in bench.costs
-    )
-    return TableBlock(
-        ("algorithm", "add", "multiply", "divide", "root", "sin, cos", "cycles", "memory"),
+    rows = []
+    for c in bench.costs:
+        counts = (c.add, c.multiply, c.divide, c.sqrt, c.trig, c.cycles)
+        rows.append((c.algorithm, *map(number, counts), str(c.memory)))
+    return table_of(
+        "algorithm | add | multiply | divide | root | sin, cos | cycles | memory",
         rows,
-        caption="Operations counted in the kernel, in steps of 0.01 rad; cycles: weighted by "
+        "Operations counted in the kernel, in steps of 0.01 rad; cycles: weighted by "
         "their duration on a Cortex-M4F's floating-point unit, for ranking; memory: numbers kept "
         "between samples.",
         strong=_named(bench),
@@ -143,37 +138,25 @@ def cost_table(bench: AttitudeComparison) -> TableBlock | None:
 def sweep_tables(bench: AttitudeComparison) -> list[TableBlock]:
     """Return the errors at every rate, one table per method of lowering it."""
     tables = []
-    answer = bench.answer
+    limit = bench.answer.tolerance_deg
     for meaning, words in MEANINGS.items():
         grid = sweep_grid(bench, meaning)
         values = grid.to_numpy(dtype=float)
         if not values.size or not math.isfinite(float(grid.min().min())):
             continue
-        passed = {
-            (i, j + 1)
-            for i, row in enumerate(values)
-            for j, value in enumerate(row)
-            if value <= answer.tolerance_deg
-        }
-        rows = tuple(
-            (
-                name,
-                *(
-                    ("✓ " if (i, j + 1) in passed else "")
-                    + (degrees(float(v)) if math.isfinite(v) else _NONE)
-                    for j, v in enumerate(values[i])
-                ),
-            )
-            for i, name in enumerate(grid.index)
-        )
+        passed = frozenset((int(i), int(j) + 1) for i, j in np.argwhere(values <= limit))
+        rows = []
+        for i, name in enumerate(grid.index):
+            cells = [degrees(v) if math.isfinite(v) else _NONE for v in values[i].tolist()]
+            ticks = ("✓ " if (i, j) in passed else "" for j in range(1, len(cells) + 1))
+            rows.append((name, *(tick + cell for tick, cell in zip(ticks, cells, strict=True))))
         tables.append(
             TableBlock(
                 ("algorithm", *(f"{number(float(rate))} Hz" for rate in grid.columns)),
-                rows,
-                caption=f"✓: within the tolerance of {degrees(answer.tolerance_deg)}."
-                if passed
-                else f"None is within the tolerance of {degrees(answer.tolerance_deg)}.",
-                passed=frozenset(passed),
+                tuple(rows),
+                caption=f"{'✓:' if passed else 'None is'} within the tolerance of "
+                f"{degrees(limit)}.",
+                passed=passed,
                 strong=_named(bench),
                 title=f"Error by rate, {words}",
             )
@@ -184,16 +167,14 @@ def sweep_tables(bench: AttitudeComparison) -> list[TableBlock]:
 def difference_table(bench: AttitudeComparison) -> TableBlock | None:
     """Return the largest difference of each pair of algorithms; None for a single one."""
     names = [run.algorithm for run in bench.runs]
-    if len(names) < 2:
-        return None
-    rows = tuple(
+    rows = [
         (name, *(_NONE if i == j else degrees(float(v)) for j, v in enumerate(values)))
         for i, (name, values) in enumerate(
             zip(names, bench.differences_deg.to_numpy(), strict=True)
         )
-    )
+    ]
     title = "Largest difference between the algorithms"
-    return TableBlock(("", *names), rows, title=title)
+    return table_of(("", *names), rows if len(rows) > 1 else (), title=title)
 
 
 #: Description of each part of the sensor error.
@@ -210,24 +191,20 @@ def budget_table(bench: AttitudeComparison) -> TableBlock | None:
     budget = bench.budget
     if budget is None or len(budget.parts) < 2:
         return None
-    rows = tuple(
-        (
-            _PARTS[row["part"]],
-            _NONE if row["part"] == "as stamped" else degrees(row["share_deg"]),
-            *(degrees(row[f"{key}_deg"]) for key in ("final", "rms", "max")),
-        )
-        for row in budget.parts.to_dict("records")
-    )
-    step = bench.clock.step
-    return TableBlock(
-        ("sensor", "change", "final", "RMS", "largest"),
+    rows = []
+    for row in budget.parts.to_dict("records"):
+        share = _NONE if row["part"] == "as stamped" else degrees(row["share_deg"])
+        errors = (degrees(row[f"{key}_deg"]) for key in ("final", "rms", "max"))
+        rows.append((_PARTS[row["part"]], share, *errors))
+    return table_of(
+        "sensor | change | final | RMS | largest",
         rows,
-        caption="Estimated from this log and its reference, removed one after the other. Stamps: "
+        "Estimated from this log and its reference, removed one after the other. Stamps: "
         f"{1e3 * budget.delay_s:.3g} ms late (1σ {1e3 * budget.delay_sd:.2g} ms), drifting by "
         f"{budget.drift_ppm:.2g} ppm (1σ {budget.drift_sd_ppm:.2g}); "
-        f"{budget.delay_s / step:.2g} of a step: 0.5 where samples are means over the step before "
-        "their stamps, 0 where they are instantaneous, -0.5 where they are means over the step "
-        "after.",
+        f"{budget.delay_s / bench.clock.step:.2g} of a step: 0.5 where samples are means over the "
+        "step before their stamps, 0 where they are instantaneous, -0.5 where they are means over "
+        "the step after.",
         title="Parts of the sensor error",
     )
 
@@ -236,50 +213,37 @@ def luck_words(luck: float) -> str:
     """Return whether a rank difference to the next algorithm is due to chance."""
     if not math.isfinite(luck):
         return _NONE
-    if luck < 0.05:
-        return f"significant ({luck:.2g})"
-    return f"not significant ({luck:.2g})"
+    return f"{'' if luck < 0.05 else 'not '}significant ({luck:.2g})"
 
 
 def trial_table(bench: AttitudeComparison) -> TableBlock | None:
     """Return the ranking over several trials; None for a single trial."""
     if bench.trials is None:
         return None
-    rows = tuple(
-        (
-            str(row["algorithm"]),
-            degrees(float(row["mean_deg"])),
-            _interval(float(row["low_deg"]), float(row["high_deg"])),
-            luck_words(float(row["luck"])),
-        )
-        for _, row in bench.trials.ranking.iterrows()
-    )
+    rows = []
+    for name, *numbers in bench.trials.ranking[_RANKING].itertuples(index=False):
+        mean, low, high, luck = map(float, numbers)
+        interval = _NONE
+        if math.isfinite(low) and math.isfinite(high):
+            interval = f"{degrees(max(low, 0.0))} to {degrees(high)}"
+        rows.append((str(name), degrees(mean), interval, luck_words(luck)))
     names = [row[0] for row in rows]
     answer = bench.answer.algorithm
-    return TableBlock(
-        ("algorithm", "mean error", "95 % interval", "difference from the next"),
+    return table_of(
+        "algorithm | mean error | 95 % interval | difference from the next",
         rows,
+        "In brackets: probability that the next one is no worse, from paired differences.",
         text=(0, 3),
-        caption="In brackets: probability that the next one is no worse, from paired differences.",
         strong=(names.index(answer),) if answer in names else (),
         title=f"Over {len(bench.trials.names)} trials",
     )
 
 
-def _interval(low: float, high: float) -> str:
-    if not (math.isfinite(low) and math.isfinite(high)):
-        return _NONE
-    return f"{degrees(max(low, 0.0))} to {degrees(high)}"
+_RANKING = ["algorithm", "mean_deg", "low_deg", "high_deg", "luck"]
 
 
 def peer_table(bench: AttitudeComparison) -> TableBlock | None:
-    """Return the errors of other libraries, gyro-only ones separate from aided ones.
-
-    Returns
-    -------
-    TableBlock or None
-        None if no other library ran, or no attitude is known.
-    """
+    """Return the errors of other libraries, gyro-only ones separate from aided ones, if known."""
     if not (bench.peers and bench.scores):
         return None
     alone, aided = like_with_like(bench)
@@ -289,35 +253,26 @@ def peer_table(bench: AttitudeComparison) -> TableBlock | None:
     ]
     rows += [(p.peer, degrees(largest_known(p.scores)), "", p.aiding) for p in alone]
     rows += [(p.peer, "", degrees(largest_known(p.scores)), p.aiding) for p in aided]
-    return TableBlock(
-        ("library", "gyro alone", "aided", "uses"),
-        tuple(rows),
-        text=(0, 3),
-        caption="Largest error against the known attitude. An aided filter also uses other "
+    return table_of(
+        "library | gyro alone | aided | uses",
+        rows,
+        "Largest error against the known attitude. An aided filter also uses other "
         "sensors: do not compare its column with the other. These libraries take each row as the "
         "mean over its step, and so do the aided filters of strapdown; its algorithms as the rate "
         "at its stamp, unless --sampling mean.",
+        text=(0, 3),
         strong=_named(bench),
         title="Filters and other libraries on the same log",
     )
 
 
 def filter_table(bench: AttitudeComparison) -> TableBlock | None:
-    """Return errors, coverage and cost of the aided filters.
-
-    Returns
-    -------
-    TableBlock or None
-        None if none ran.
-    """
-    _, aided = like_with_like(bench)
-    if not aided:
-        return None
+    """Return errors, coverage and cost of the aided filters, if any ran."""
+    rows = [_filter_row(peer) for peer in like_with_like(bench)[1]]
     columns: tuple[str, ...] = (
         *("filter", "uses", "RMS", "final", "tilt", "heading", "drift/min", "in 95 %"),
         *(f"≤ {bench.answer.tolerance_deg:g}° to", "float32", "ops", "bytes"),
     )
-    rows = [_filter_row(peer) for peer in aided]
     errors = slice(2, 9)  # against a truth
     caption = (
         "Float32: largest difference in single precision. Ops: operations a sample, as counted on "
@@ -335,7 +290,7 @@ def filter_table(bench: AttitudeComparison) -> TableBlock | None:
         )
     else:
         columns, *rows = (row[: errors.start] + row[errors.stop :] for row in (columns, *rows))
-    return TableBlock(columns, tuple(rows), text=(0, 1), caption=caption, title="Aided filters")
+    return table_of(columns, rows, caption, text=(0, 1), title="Aided filters")
 
 
 def _filter_row(peer: PeerRun) -> tuple[str, ...]:
@@ -366,37 +321,25 @@ def _filter_row(peer: PeerRun) -> tuple[str, ...]:
 
 
 def place_table(bench: AttitudeComparison) -> TableBlock | None:
-    """Return the errors of dead-reckoned positions against known positions.
-
-    Returns
-    -------
-    TableBlock or None
-        None if no position was given.
-    """
-    if not bench.places:
-        return None
-    rows = tuple(
+    """Return the errors of dead-reckoned positions against known positions, if any is given."""
+    legs = max((place.legs for place in bench.places), default=0)
+    return table_of(
+        "algorithm | reference | error, m | 1σ, m | zero velocity, m | 1σ, m | final velocity, m/s",
         (
-            place.algorithm,
-            place.against,
-            f"{place.error_m:.3g}",
-            f"{place.sd_m:.2g}",
-            f"{place.corrected_error_m:.3g}",
-            f"{place.corrected_sd_m:.2g}",
-            f"{place.end_velocity_m_s:.3g}",
-        )
-        for place in bench.places
-    )
-    legs = max(place.legs for place in bench.places)
-    return TableBlock(
-        (
-            *("algorithm", "reference", "error, m", "1σ, m", "zero velocity, m", "1σ, m"),
-            "final velocity, m/s",
+            (
+                place.algorithm,
+                place.against,
+                f"{place.error_m:.3g}",
+                f"{place.sd_m:.2g}",
+                f"{place.corrected_error_m:.3g}",
+                f"{place.corrected_sd_m:.2g}",
+                f"{place.end_velocity_m_s:.3g}",
+            )
+            for place in bench.places
         ),
-        rows,
-        text=(0, 1),
-        caption=f"Over at most {legs} stretch{'es' if legs > 1 else ''} between rests. Zero "
+        f"Over at most {legs} stretch{'es' if legs > 1 else ''} between rests. Zero "
         "velocity: corrected for zero velocity at the end of each. 1σ: from assumed biases, tilt "
         "and noise of a consumer sensor, without scale factors.",
+        text=(0, 1),
         title="Positions, dead-reckoned between rests",
     )

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pandas as pd
 
 from strapdown.attitude_algorithms import ALGORITHMS
@@ -80,22 +79,19 @@ def _ranked(bench: AttitudeComparison, scores: list[Score], off: str) -> str:
     # A run through the pole may be near the truth by chance; it is not named as the best.
     lost = {r.algorithm for r in bench.runs if passed_pole(r)}
     best = next((s for s in ranked if s.algorithm not in lost), ranked[0])
+    least = degrees(best.error_deg)
     # Algorithms with equal displayed errors are named together.
     level = [
         s.algorithm
         for s in scores
-        if degrees(s.error_deg) == degrees(best.error_deg)
-        and (s is best or s.algorithm not in lost)
+        if degrees(s.error_deg) == least and (s is best or s.algorithm not in lost)
     ]
-    verb = "are" if len(level) > 1 else "is"
-    text = f"{_listed(level)} {verb} {degrees(best.error_deg)} {off}"
+    *others, last = level
+    named = f"{', '.join(others)} and {last} are" if others else f"{last} is"
+    text = f"{named} {least} {off}"
     if worst.algorithm not in level:
         text += f"; {worst.algorithm} is {degrees(worst.error_deg)}"
     return text
-
-
-def _listed(names: list[str]) -> str:
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 # Share of the total error below which the algorithm error does not explain it.
@@ -124,14 +120,12 @@ def _whose_error(bench: AttitudeComparison, scores: list[Score]) -> str:
 def condition(diagnostics: dict[str, float]) -> str:
     """Diagnostics of an algorithm in words."""
     parts = []
-    if "closest_to_pole_deg" in diagnostics:
-        near = diagnostics["closest_to_pole_deg"]
+    if (near := diagnostics.get("closest_to_pole_deg")) is not None:
         how = f"±90° pitch {degrees(near)} off" if near else "through ±90° pitch"
         parts.append(f"{how} at {seconds(diagnostics['closest_to_pole_time_s'])}")
-    if "orthogonality_loss" in diagnostics:
-        parts.append(f"|CᵀC − I| = {diagnostics['orthogonality_loss']:.1e}")
-    if "norm_error" in diagnostics:
-        parts.append(f"|q| − 1 = {diagnostics['norm_error']:.1e}")
+    for key, words in (("orthogonality_loss", "|CᵀC − I|"), ("norm_error", "|q| − 1")):
+        if key in diagnostics:
+            parts.append(f"{words} = {diagnostics[key]:.1e}")
     return "; ".join(parts) or "–"
 
 
@@ -162,22 +156,22 @@ def facts(bench: AttitudeComparison) -> list[tuple[str, str]]:
     """Inputs and assumptions of the run."""
     found = [("Log", bench.description), *premises(bench.initial, bench.gyro_bias)]
     if bench.truth is not None:
-        found.append(("Truth", _truth_words(bench)))
+        known = f"known at {len(bench.truth)} samples"
+        counted = bench.truth.index[bench.scored]
+        if len(counted):
+            first, last = seconds(float(counted[0])), seconds(float(counted[-1]))
+            known += f"; {len(counted)} of them count, from {first} to {last}"
+        else:
+            known += ", none of which counts"
+        found.append(("Truth", known))
     if bench.second is not None:
         found.append(("Second log", second_words(bench.second)))
     if bench.sampling_error_deg is not None:
-        final, most = bench.sampling_error_deg
-        how = (
-            "error of exact arithmetic on noise-free samples at this rate"
-            if bench.specification["source"]["kind"] == "scenario"
-            else "estimate: rates interpolated linearly between their stamps, against cubically"
-        )
-        found.append(
-            (
-                "Sampling error",
-                f"{degrees(final)} at the end, {degrees(most)} at most: {how}",
-            )
-        )
+        final, most = map(degrees, bench.sampling_error_deg)
+        how = "estimate: rates interpolated linearly between their stamps, against cubically"
+        if bench.specification["source"]["kind"] == "scenario":
+            how = "error of exact arithmetic on noise-free samples at this rate"
+        found.append(("Sampling error", f"{final} at the end, {most} at most: {how}"))
     if bench.rests:
         shown = [
             f"{seconds(r.start)} to {seconds(r.end)}, mean rate "
@@ -203,17 +197,6 @@ def premises(initial: Mapping[str, Any], gyro_bias: Mapping[str, Any]) -> list[t
         f"{i['heading_deg']:.3f}° at {seconds(i['time_s'])}: {i['from']}"
     )
     return [("Initial attitude", begins), ("Gyro bias", removed)]
-
-
-def _truth_words(bench: AttitudeComparison) -> str:
-    assert bench.truth is not None
-    counted = bench.truth.index[bench.scored]
-    if not len(counted):
-        return f"known at {len(bench.truth)} samples, none of which counts"
-    return (
-        f"known at {len(bench.truth)} samples; {len(counted)} of them count, from "
-        f"{seconds(float(counted[0]))} to {seconds(float(counted[-1]))}"
-    )
 
 
 def second_words(second: SecondLog) -> str:
@@ -246,13 +229,9 @@ def largest_known(scores: Sequence[Score]) -> float | None:
 
 
 def full_rate_errors(bench: AttitudeComparison) -> dict[str, float]:
-    """Return the error by which each algorithm is judged, at the log's own rate.
+    """Return the error in deg by which each algorithm is judged at the log's own rate, by name.
 
-    Returns
-    -------
-    dict of str to float
-        In deg, in the order of the runs: the largest error against known attitudes, else the
-        algorithm error.
+    The largest error against known attitudes, else the algorithm error.
     """
     own = {share.algorithm: share.own_deg[2] for share in bench.shares}
     swept: dict[str, float] = {}
@@ -269,41 +248,27 @@ def full_rate_errors(bench: AttitudeComparison) -> dict[str, float]:
 
 def chosen_run(bench: AttitudeComparison) -> AttitudeRun:
     """Return the run of the recommended algorithm, else that with the smallest error."""
-    for run in bench.runs:
-        if run.algorithm == bench.answer.algorithm:
-            return run
-    errors = full_rate_errors(bench)
-    return min(
-        bench.runs,
-        key=lambda r: errors[r.algorithm] if math.isfinite(errors[r.algorithm]) else math.inf,
-    )
+    errors, answer = full_rate_errors(bench), bench.answer.algorithm
+
+    def order(run: AttitudeRun) -> float:
+        error = errors[run.algorithm]
+        return -1.0 if run.algorithm == answer else error if math.isfinite(error) else math.inf
+
+    return min(bench.runs, key=order)
 
 
 def sweep_grid(bench: AttitudeComparison, meaning: str, column: str = "error_deg") -> pd.DataFrame:
-    """Return the errors of one method of lowering the rate.
+    """Return the errors of one method of lowering the rate, deg; NaN where one did not run.
 
-    Parameters
-    ----------
-    meaning : {'drop', 'sum'}
-    column : str
-        Of the sweep.
-
-    Returns
-    -------
-    DataFrame
-        In deg: algorithms in the order of the runs, rates in Hz from high to low; NaN where an
-        algorithm did not run.
+    `meaning`: ``drop`` or ``sum``; `column`: of the sweep. Algorithms are in the order of the runs,
+    rates in Hz from high to low.
     """
     names = [run.algorithm for run in bench.runs]
-    if not len(bench.sweep):
+    part = bench.sweep[bench.sweep["meaning"] == meaning] if len(bench.sweep) else bench.sweep
+    if not len(part):
         return pd.DataFrame(index=names)
-    part = bench.sweep[bench.sweep["meaning"] == meaning]
-    rates = sorted(set(part["rate_hz"].tolist()), reverse=True)
-    grid = np.full((len(names), len(rates)), np.nan)
-    for name, rate, error in part[["algorithm", "rate_hz", column]].itertuples(index=False):
-        cell = names.index(name), rates.index(rate)
-        grid[cell] = np.fmax(grid[cell], error)
-    return pd.DataFrame(grid, index=names, columns=rates)
+    grid = part.pivot_table(column, "algorithm", "rate_hz", "max", dropna=False)
+    return grid.reindex(names)[sorted(grid.columns, reverse=True)]
 
 
 def like_with_like(bench: AttitudeComparison) -> tuple[list[PeerRun], list[PeerRun]]:
@@ -316,13 +281,15 @@ def share_basis(bench: AttitudeComparison) -> str:
     """Return whether the shares are exact or estimates."""
     if bench.specification["source"]["kind"] == "scenario":
         return "Exact: each algorithm also ran on simulated samples without sensor errors."
-    own = (
+    unknown = all(share.sensor_deg is None for share in bench.shares)
+    return (
         "Estimate: the algorithm error is the difference from the most accurate algorithm on the "
         "same samples"
+    ) + (
+        "; the sensor error is unknown without a truth."
+        if unknown
+        else ", the sensor error that one's error against the truth."
     )
-    if any(share.sensor_deg is not None for share in bench.shares):
-        return own + ", the sensor error that one's error against the truth."
-    return own + "; the sensor error is unknown without a truth."
 
 
 def source_of(run: AttitudeRun) -> str:

@@ -7,22 +7,25 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from strapdown import __version__
 from strapdown.bundle import write_json
 from strapdown.config.logs import CalibrateSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.formats import csv
-from strapdown.report.chart import AXIS_COLOURS, Chart, Level, Line, Panel
+from strapdown.report.chart import AXIS_COLOURS, Chart, Level, Panel, dots
 from strapdown.report.document import (
     Document,
-    Items,
     Paragraph,
     TableBlock,
+    document_of,
     findings_list,
+    items_of,
+    listed,
     paragraph,
     run_again,
     section,
+    table_of,
 )
 from strapdown.report.report_bundle import bundle_by_specification, finite, with_page
 from strapdown.report.values import about
@@ -33,50 +36,35 @@ from strapdown.systems.calibrate_run import CalibrateRun, run_calibrate
 DEG, G = math.pi / 180.0, STANDARD_GRAVITY
 XYZ = ("x", "y", "z")
 #: Rows of the table: title, unit, factor, names of the parameters.
-ROWS: tuple[tuple[str, str, float, tuple[str, ...]], ...] = (
-    ("gyro bias", "deg/s", 1.0 / DEG, tuple(f"gyro_bias_{a}" for a in XYZ)),
-    ("gyro scale", "%", 100.0, tuple(f"gyro_scale_{a}" for a in XYZ)),
-    (
-        "gyro x by y, y by z, z by x",
-        "deg",
-        1.0 / DEG,
-        tuple(f"gyro_misalignment_{t}" for t in ("xy", "yz", "zx")),
-    ),
-    (
-        "gyro x by z, y by x, z by y",
-        "deg",
-        1.0 / DEG,
-        tuple(f"gyro_misalignment_{t}" for t in ("xz", "yx", "zy")),
-    ),
-    *(
+ROWS: tuple[tuple[str, str, float, tuple[str, ...]], ...] = tuple(
+    (title, unit, factor, tuple(f"{name}_{axis}" for axis in axes))
+    for title, unit, factor, name, axes in (
+        ("gyro bias", "deg/s", 1.0 / DEG, "gyro_bias", XYZ),
+        ("gyro scale", "%", 100.0, "gyro_scale", XYZ),
+        ("gyro x by y, y by z, z by x", "deg", 1.0 / DEG, "gyro_misalignment", ("xy", "yz", "zx")),
+        ("gyro x by z, y by x, z by y", "deg", 1.0 / DEG, "gyro_misalignment", ("xz", "yx", "zy")),
+        *(
+            (
+                f"gyro by force along {f}",
+                "deg/s/g",
+                G / DEG,
+                "g_sensitivity",
+                ("x" + f, "y" + f, "z" + f),
+            )
+            for f in XYZ
+        ),
+        ("gyro bias with temperature", "deg/s/°C", 1.0 / DEG, "gyro_temperature", XYZ),
+        ("accelerometer bias", "mg", 1e3 / G, "accel_bias", XYZ),
+        ("accelerometer scale", "%", 100.0, "accel_scale", XYZ),
         (
-            f"gyro by force along {f}",
-            "deg/s/g",
-            G / DEG,
-            tuple(f"g_sensitivity_{a}{f}" for a in XYZ),
-        )
-        for f in XYZ
-    ),
-    (
-        "gyro bias with temperature",
-        "deg/s/°C",
-        1.0 / DEG,
-        tuple(f"gyro_temperature_{a}" for a in XYZ),
-    ),
-    ("accelerometer bias", "mg", 1e3 / G, tuple(f"accel_bias_{a}" for a in XYZ)),
-    ("accelerometer scale", "%", 100.0, tuple(f"accel_scale_{a}" for a in XYZ)),
-    (
-        "accelerometer axes xy, yz, xz",
-        "deg",
-        1.0 / DEG,
-        tuple(f"accel_misalignment_{t}" for t in ("xy", "yz", "xz")),
-    ),
-    (
-        "accelerometer bias with temperature",
-        "mg/°C",
-        1e3 / G,
-        tuple(f"accel_temperature_{a}" for a in XYZ),
-    ),
+            "accelerometer axes xy, yz, xz",
+            "deg",
+            1.0 / DEG,
+            "accel_misalignment",
+            ("xy", "yz", "xz"),
+        ),
+        ("accelerometer bias with temperature", "mg/°C", 1e3 / G, "accel_temperature", XYZ),
+    )
 )
 CAPTION = (
     "Reading − truth in the axes of the sensor, ± 95 % bound. ? : not observed, left as before. "
@@ -180,34 +168,42 @@ def parameter_table(result: CalibrateRun) -> TableBlock | None:
         if names[0] not in by_name:
             continue
         cells = []
-        for name in names:
-            k = by_name[name]
+        for k in (by_name[name] for name in names):
             text = about(factor * float(found.values[k]), 1.96 * factor * float(sd[k]), "")
             cells.append(text + ("" if observed[k] else " ?"))
         rows.append((title, unit, *cells))
-    return TableBlock(("Error", "unit", *XYZ), tuple(rows), text=(0, 1), caption=CAPTION)
+    return table_of(("Error", "unit", *XYZ), rows, CAPTION, text=(0, 1))
+
+
+#: Residuals of the rests: title, unit, factor, columns before and after the calibration.
+RESIDUALS = (
+    ("force at rest − gravity", "mg", 1e3 / G, ("force_error", "force_left")),
+    ("vertical after a turn, by the gyro", "deg", 1.0 / DEG, ("turn_error", "turn_left")),
+)
+
+
+def _rests(result: CalibrateRun) -> pd.DataFrame | None:
+    """Rests that are not known rotations, if there are rests."""
+    found = result.calibration
+    if found is None or not len(found.rests):
+        return None
+    return found.rests[~found.rests["held"]]
 
 
 def effect_table(result: CalibrateRun) -> TableBlock | None:
     """Return what the calibration changes: force at rest, and the vertical after turns."""
-    found = result.calibration
-    if found is None or not len(found.rests):
+    still = _rests(result)
+    if still is None:
         return None
-    still = found.rests[~found.rests["held"]]
     rows = []
-    for title, unit, factor, names in (
-        ("force at rest − gravity", "mg", 1e3 / G, ("force_error", "force_left")),
-        ("vertical after a turn, by the gyro", "deg", 1.0 / DEG, ("turn_error", "turn_left")),
-    ):
+    for title, unit, factor, names in RESIDUALS:
         before, after = (still[n].dropna().to_numpy(dtype=np.float64) for n in names)
         if before.size:
             values = [factor * math.sqrt(float(np.mean(v**2))) for v in (before, after)]
             rows.append((title, unit, *(f"{v:.3g}" for v in values)))
-    columns = ("Root mean square", "unit", "before", "after")
-    force = still["force_error"].to_numpy(np.float64), still["force_left"].to_numpy(np.float64)
-    worse = float(np.square(force[1]).sum()) > float(np.square(force[0]).sum())
-    caption = FEW_POSES if worse else ""
-    return TableBlock(columns, tuple(rows), text=(0, 1), caption=caption) if rows else None
+    was, left = (float(np.square(still[n].to_numpy(np.float64)).sum()) for n in RESIDUALS[0][3])
+    caption = FEW_POSES if left > was else ""
+    return table_of("Root mean square | unit | before | after", rows, caption, text=(0, 1))
 
 
 def turn_table(result: CalibrateRun) -> TableBlock | None:
@@ -215,20 +211,14 @@ def turn_table(result: CalibrateRun) -> TableBlock | None:
     found = result.calibration
     if found is None or not len(found.turns):
         return None
-    rows = tuple(
-        (
-            XYZ[int(row["axis"])],
-            f"{row['known'] / DEG:.6g}",
-            f"{row['measured'] / DEG:.6g}",
-            f"{row['left'] / DEG:.3g}",
-        )
-        for row in found.turns.to_dict("records")
-    )
+    rows = []
+    for row in found.turns.to_dict("records"):
+        known, measured, left = (row[key] / DEG for key in ("known", "measured", "left"))
+        rows.append((XYZ[int(row["axis"])], f"{known:.6g}", f"{measured:.6g}", f"{left:.3g}"))
     caption = (
         "Angles in deg, rates in deg/s. Left: what the end differs by from the known rotation."
     )
-    columns = ("Known rotation about", "known", "measured", "left")
-    return TableBlock(columns, rows, text=(0,), caption=caption)
+    return table_of("Known rotation about | known | measured | left", rows, caption)
 
 
 def field_table(result: CalibrateRun) -> TableBlock | None:
@@ -247,11 +237,10 @@ def field_table(result: CalibrateRun) -> TableBlock | None:
     rows = [("hard iron", "% of the field", *iron)]
     if np.isfinite(mag.rotation_sd).all():
         turn = rotation_vector_from_dcm(mag.rotation) / DEG
-        axes = [
-            about(v, TWO_SIDED_95 * s / DEG, "") for v, s in zip(turn, mag.rotation_sd, strict=True)
-        ]
+        pairs = zip(turn, mag.rotation_sd, strict=True)
+        axes = [about(v, TWO_SIDED_95 * s / DEG, "") for v, s in pairs]
         rows.append(("axes against accelerometers", "deg", *axes))
-    return TableBlock(("Magnetometer", "unit", *XYZ), tuple(rows), text=(0, 1), caption=caption)
+    return table_of(("Magnetometer", "unit", *XYZ), rows, caption, text=(0, 1))
 
 
 # Page and charts.
@@ -260,8 +249,15 @@ def field_table(result: CalibrateRun) -> TableBlock | None:
 def calibrate_document(result: CalibrateRun, name: str = "") -> Document:
     """Return the report of a calibration."""
     found = result.calibration
-    sections = [
-        section("poses", "Poses: what is missing", poses_chart(result), _missing(result)),
+    remedies = () if found is None else found.remedies
+    missing = items_of(
+        ("Turn", f"by 90° or more about {one[-1]}, from rest to rest")
+        if one.startswith("turn ")
+        else ("Rest", f"with {one} up")
+        for one in remedies
+    )
+    sections = (
+        section("poses", "Poses: what is missing", poses_chart(result), missing),
         section("effect", "Before and after", rests_chart(result), turn_table(result)),
         section("bounds", "Errors and their bounds", bounds_chart(result), folded=True),
         section(
@@ -271,71 +267,47 @@ def calibrate_document(result: CalibrateRun, name: str = "") -> Document:
             paragraph(result.calibration_text(), "mono"),
             folded=True,
         ),
-        section("method", "Method", Items(tuple(("", text) for text in METHOD)), folded=True),
+        section("method", "Method", listed(METHOD), folded=True),
         section("again", "Check this folder", *run_again(name)),
-    ]
+    )
     good = not any(f.severity == "warning" for f in result.findings)
-    tables = (parameter_table(result), effect_table(result), field_table(result))
     front = (
         Paragraph(headline(result), "lead" if good else "warning"),
-        *(t for t in tables if t is not None),
-        *((findings_list(result.findings, "cli"),) if result.findings else ()),
+        *(parameter_table(result), effect_table(result), field_table(result)),
+        findings_list(result.findings, "cli") if result.findings else None,
     )
-    links = [("calibrate.json", "errors with their bounds, SI")]
-    links.append(("calibration.toml", "the calibration, for --calibration"))
+    links = [
+        ("calibrate.json", "errors with their bounds, SI"),
+        ("calibration.toml", "the calibration, for --calibration"),
+    ]
     if found is not None and len(found.rests):
         links.append(("rests.csv", "rests with their residuals, SI"))
-    facts = (("Procedure", result.procedure), ("Software", f"strapdown {__version__}"))
-    return Document(
-        result.name, "Calibration of the sensor", facts, front, tuple(sections), links=tuple(links)
-    )
-
-
-def _missing(result: CalibrateRun) -> Items | None:
-    found = result.calibration
-    if found is None or not found.remedies:
-        return None
-    rows = []
-    for one in found.remedies:
-        if one.startswith("turn "):
-            rows.append(("Turn", f"by 90° or more about {one[-1]}, from rest to rest"))
-        else:
-            rows.append(("Rest", f"with {one} up"))
-    return Items(tuple(rows))
+    facts = (("Procedure", result.procedure),)
+    title = "Calibration of the sensor"
+    return document_of(result.name, title, facts, front, sections, links=links)
 
 
 def _map(up: np.ndarray[Any, Any]) -> tuple[float, float]:
     """Azimuth and elevation of a direction in the axes of the sensor, deg."""
-    return math.degrees(math.atan2(up[1], up[0])), math.degrees(
-        math.asin(max(-1.0, min(1.0, up[2])))
-    )
+    elevation = math.asin(max(-1.0, min(1.0, up[2])))
+    return math.degrees(math.atan2(up[1], up[0])), math.degrees(elevation)
 
 
 def poses_chart(result: CalibrateRun) -> Chart | None:
     """Return the directions that were up, and those that are missing."""
-    found = result.calibration
-    if found is None or not len(found.rests):
+    found, still = result.calibration, _rests(result)
+    if found is None or still is None:
         return None
-    still = found.rests[~found.rests["held"]]
     places = np.array([_map(u) for u in still[["up_x", "up_y", "up_z"]].to_numpy()]).reshape(-1, 2)
-    lines = [Line("rest", places[:, 0], places[:, 1], AXIS_COLOURS[0], points=True, size=6.0)]
-    missing = [r for r in found.remedies if not r.startswith("turn")]
-    if missing:
+    lines = [dots("rest", places[:, 0], places[:, 1], AXIS_COLOURS[0], size=6.0)]
+    if missing := [r for r in found.remedies if not r.startswith("turn")]:
         ups = [
             np.array([float(f"{s}1") if (s := _sign(r, a)) else 0.0 for a in XYZ]) for r in missing
         ]
         at = np.array([_map(u / np.linalg.norm(u)) for u in ups])
-        lines.append(
-            Line(
-                "missing",
-                at[:, 0],
-                at[:, 1],
-                AXIS_COLOURS[1],
-                points=True,
-                hollow=True,
-                labels=tuple(f"{r} up" for r in missing),
-            )
-        )
+        labels = tuple(f"{r} up" for r in missing)
+        points = dots("missing", at[:, 0], at[:, 1], AXIS_COLOURS[1], hollow=True, labels=labels)
+        lines.append(points)
     panel = Panel("elevation of up above the xy plane, deg", tuple(lines))
     return Chart("poses", "What was up", "", "azimuth of up from x to y, deg", (panel,))
 
@@ -347,22 +319,19 @@ def _sign(text: str, axis: str) -> str:
 
 def rests_chart(result: CalibrateRun) -> Chart | None:
     """Return force and vertical at each rest, before and after."""
-    found = result.calibration
-    if found is None or not len(found.rests):
+    still = _rests(result)
+    if still is None:
         return None
-    still = found.rests[~found.rests["held"]]
-    x = np.arange(1, len(still) + 1, dtype=np.float64)
+    x = np.arange(1, len(still) + 1)
     panels = []
-    for title, unit, factor, names in (
-        ("Force at rest − gravity", "mg", 1e3 / G, ("force_error", "force_left")),
-        ("Vertical after the turn to it", "deg", 1.0 / DEG, ("turn_error", "turn_left")),
-    ):
+    titles = ("Force at rest − gravity", "Vertical after the turn to it")
+    for title, (_, unit, factor, names) in zip(titles, RESIDUALS, strict=True):
         before, after = (factor * still[n].to_numpy(dtype=np.float64) for n in names)
         if not np.isfinite(before).any():
             continue
         lines = (
-            Line("before", x, before, AXIS_COLOURS[1], points=True, hollow=True, size=6.0),
-            Line("after", x, after, AXIS_COLOURS[0], points=True, size=6.0),
+            dots("before", x, before, AXIS_COLOURS[1], size=6.0, hollow=True),
+            dots("after", x, after, AXIS_COLOURS[0], size=6.0),
         )
         panels.append(Panel(f"error, {unit}", lines, title=title, levels=(Level(0.0, ""),)))
     return Chart("rests", "Residuals at rests", "", "rest", tuple(panels)) if panels else None
@@ -374,13 +343,9 @@ def bounds_chart(result: CalibrateRun) -> Chart | None:
     if found is None:
         return None
     share = 100.0 * found.sd / found.prior_sd
-    x = np.arange(1, share.size + 1, dtype=np.float64)
-    panel = Panel(
-        "standard deviation, % of that before",
-        (Line("error", x, share, AXIS_COLOURS[0], points=True, size=5.0),),
-        log=True,
-        levels=(Level(50.0, "observed below"),),
-    )
+    points = dots("error", np.arange(1, share.size + 1), share, AXIS_COLOURS[0], size=5.0)
+    levels = (Level(50.0, "observed below"),)
+    panel = Panel("standard deviation, % of that before", (points,), log=True, levels=levels)
     caption = ", ".join(f"{k + 1} {n.replace('_', ' ')}" for k, n in enumerate(found.names))
     return Chart("bounds", "How well each error is known", caption, "error", (panel,))
 

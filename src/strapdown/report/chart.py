@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -333,6 +334,20 @@ def curve(
     xs, ys = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     rows = kept_rows((ys,), buckets)
     return Line(name, xs[rows], ys[rows], colour, dash, width)
+
+
+def dots(
+    name: str,
+    x: ArrayLike,
+    y: ArrayLike,
+    colour: str,
+    symbol: str = "diamond",
+    size: float = 9.0,
+    **more: Any,
+) -> Line:
+    """Make points without a curve; `more`: further fields of a `Line`."""
+    xs, ys = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    return Line(name, xs, ys, colour, points=True, symbol=symbol, size=size, **more)
 
 
 def break_jumps(angle_deg: ArrayLike) -> Array:

@@ -383,17 +383,9 @@ _ROW = LEVEL + 2.0
 
 
 def still(chart: Chart, *, title: bool = False, caption: bool = False) -> str:
-    """Draw a chart for the column of a printed page, 170 mm wide.
+    """Draw a chart for the column of a printed page, 170 mm wide, as a whole SVG.
 
-    Parameters
-    ----------
-    title, caption : bool
-        Whether to write them in the picture; a document writes them itself.
-
-    Returns
-    -------
-    str
-        A whole SVG.
+    `title`, `caption`: whether they are in the picture; a document writes them itself.
     """
     head = _folded(chart.title, _WIDTH - 2.0 * _EDGE, _HEAD, bold=True) if title else []
     foot = _folded(chart.caption, _WIDTH - 2.0 * _EDGE, TICK) if caption else []
@@ -482,7 +474,14 @@ def _frames(chart: Chart, start: float, height: float) -> list[Frame]:
         (left, right), (top, bottom) = boxes[k], spans[k]
         x, y = xs[k], ys[k]
         if panel.x_label:
-            x, y = _one_scale(x, y, (right - left) / (bottom - top))
+            # Both axes of a plane have one scale: the one with room is widened.
+            shape, wide, high = (right - left) / (bottom - top), x.high - x.low, y.high - y.low
+            if wide < shape * high:
+                room = 0.5 * (shape * high - wide)
+                x = replace(x, low=x.low - room, high=x.high + room)
+            else:
+                room = 0.5 * (wide / shape - high)
+                y = replace(y, low=y.low - room, high=y.high + room)
             y_ticks[k] = _y_ticks(panel, y, bottom - top)
         step = panel.x_step if panel.x_label or k == count - 1 else 0.0
         x_ticks = ticks(x, int((right - left) / _ACROSS), step=step, between=100.0)
@@ -529,16 +528,6 @@ def _scales(chart: Chart) -> tuple[list[Scale], list[Scale]]:
     span = strip_range(chart)
     shared = fitted(together, chart.log_x, margin) if span is None else Scale(*span)
     return [own.get(k, shared) for k in range(len(ys))], ys
-
-
-def _one_scale(x: Scale, y: Scale, shape: float) -> tuple[Scale, Scale]:
-    """Widen one axis of a plane, so that both axes have one scale in a panel of given shape."""
-    wide, high = x.high - x.low, y.high - y.low
-    if wide < shape * high:
-        room = 0.5 * (shape * high - wide)
-        return replace(x, low=x.low - room, high=x.high + room), y
-    room = 0.5 * (wide / shape - high)
-    return x, replace(y, low=y.low - room, high=y.high + room)
 
 
 def _y_ticks(panel: Panel, scale: Scale, tall: float) -> list[Tick]:
@@ -668,17 +657,8 @@ _NAME_GAP = 1.5
 def label_side(share: float, label: str, letter: float) -> str:
     """Return the alignment of a name at its mark that keeps it within the axes.
 
-    Parameters
-    ----------
-    share : float
-        Position of the mark, as a share of the axis from the left.
-    letter : float
-        Width of a letter, as a share of the axis.
-
-    Returns
-    -------
-    {'left', 'center', 'right'}
-        Part of the name at the mark.
+    `share`: position of the mark from the left, and `letter`: width of a letter, as shares of the
+    axis. ``left``, ``center`` or ``right``: the part of the name at the mark.
     """
     half = 0.5 * letter * len(label)
     if share < half:
@@ -687,17 +667,9 @@ def label_side(share: float, label: str, letter: float) -> str:
 
 
 def label_rows(shares: Sequence[float], labels: Sequence[str], letter: float) -> tuple[int, ...]:
-    """Return the row of each name, from 0 at the axes upward.
+    """Return the row of each name, from 0 at the axes upward; arguments as of `label_side`.
 
-    Parameters
-    ----------
-    shares, labels, letter
-        As in `label_side`, for every mark.
-
-    Returns
-    -------
-    tuple of int
-        The lowest row without overlap with the names to the left.
+    It is the lowest row without overlap with the names to the left.
     """
     ends: list[float] = []
     rows = [0] * len(shares)
@@ -707,9 +679,7 @@ def label_rows(shares: Sequence[float], labels: Sequence[str], letter: float) ->
         start = shares[k] - part * wide
         free = (row for row, end in enumerate(ends) if end + _NAME_GAP * letter <= start)
         row = next(free, len(ends))
-        if row == len(ends):
-            ends.append(0.0)
-        ends[row] = start + wide
+        ends[row : row + 1] = [start + wide]
         rows[k] = row
     return tuple(rows)
 
@@ -762,14 +732,9 @@ class Tick:
 
 
 def fitted(values: Sequence[ArrayLike], log: bool = False, margin: float = 0.05) -> Scale:
-    """Make an axis that contains the values, with a margin at both ends.
+    """Make an axis that contains the values, with a margin at both ends, as a share of their span.
 
-    Parameters
-    ----------
-    values : sequence of array_like
-        Values that are not finite, or not positive on a logarithmic axis, are ignored.
-    margin : float
-        As a share of the span of the values.
+    Values that are not finite, or not positive on a logarithmic axis, are ignored.
     """
     v = np.concatenate([np.empty(0), *(np.asarray(x, dtype=np.float64).ravel() for x in values)])
     v = v[np.isfinite(v) & ((v > 0.0) if log else True)]
@@ -786,16 +751,10 @@ def fitted(values: Sequence[ArrayLike], log: bool = False, margin: float = 0.05)
 
 
 def ticks(scale: Scale, most: int, *, step: float = 0.0, between: float = 30.0) -> list[Tick]:
-    """Choose the ticks of an axis.
+    """Choose the ticks of an axis, of `most` steps at most.
 
-    Parameters
-    ----------
-    most : int
-        Maximum number of steps.
-    step : float
-        Requested step, if any; not for a logarithmic axis.
-    between : float
-        A logarithmic axis of a smaller ratio also has labels at 2 and 5 times powers of ten.
+    `step`: requested, if any, and not of a logarithmic axis. `between`: a logarithmic axis of a
+    smaller ratio also has labels at 2 and 5 times powers of ten.
     """
     if not scale.log:
         return _even(scale, step or nice_step((scale.high - scale.low) / max(most, 1)))

@@ -229,8 +229,8 @@ class RunComparison:
             made |= {"quantity": about.label, "unit": about.unit}
             for run, value in zip(self.runs, row.values, strict=True):
                 low, high = _ends(value)
-                made[run.name] = None if value is None else value.value
-                made[f"{run.name} low"], made[f"{run.name} high"] = low, high
+                made |= {run.name: value and value.value}
+                made |= {f"{run.name} low": low, f"{run.name} high": high}
             for k, run in enumerate(self.runs[1:], start=1):
                 made[f"{run.name} difference"] = row.differences[k]
                 made[f"{run.name} combined"] = row.combined[k]
@@ -358,7 +358,10 @@ def compare_results(
     if len(given) < 2:
         raise ConfigError("compare.one-run", quantity="RUN", count=len(given))
     paths = {k: Path(one) for k, one in enumerate(given) if isinstance(one, str | Path)}
-    _refuse_twice(list(paths.values()))
+    places = [path.resolve() for path in paths.values()]
+    for k, path in enumerate(paths.values()):
+        if places[k] in places[:k]:
+            raise ConfigError("compare.same-run", file=str(path), quantity="RUN")
     for path in paths.values():
         _check(path)
     names = {k: f"run {k + 1}" for k in range(len(given))}
@@ -391,15 +394,6 @@ def compare_results(
         raise
     weakref.finalize(result, shutil.rmtree, made, ignore_errors=True)
     return result
-
-
-def _refuse_twice(paths: Sequence[Path]) -> None:
-    """Refuse a run that is given twice: ConfigError."""
-    seen = set()
-    for path in paths:
-        if path.resolve() in seen:
-            raise ConfigError("compare.same-run", file=str(path), quantity="RUN")
-        seen.add(path.resolve())
 
 
 def compared(runs: Sequence[SealedRun]) -> RunComparison:
@@ -518,8 +512,10 @@ def _apart(first: Value, other: Value) -> float | None:
     """Other minus first; None for words, other units and other instants."""
     if (first.kind, first.unit) != (other.kind, other.unit):
         return None
-    if first.at is not None and other.at is not None and not _same_instant(first.at, other.at):
-        return None
+    if first.at is not None and other.at is not None:
+        least = max(SAME_INSTANT, 8.0 * math.ulp(first.at))
+        if abs(first.at - other.at) > least:
+            return None
     if first.place is not None and other.place is not None:
         try:
             north, east, _ = map(float, place_difference(other.place, first.place))
@@ -530,10 +526,6 @@ def _apart(first: Value, other: Value) -> float | None:
         return None
     apart = other.value - first.value
     return (apart + 180.0) % 360.0 - 180.0 if first.kind == "angle" else apart
-
-
-def _same_instant(one: float, two: float) -> bool:
-    return abs(one - two) <= max(SAME_INSTANT, 8.0 * math.ulp(one))
 
 
 # Configurations, which are run first.
@@ -597,13 +589,10 @@ def _run_file(path: Path, out: Path, progress: Progress) -> None:
 
 
 def comparison_json(result: RunComparison) -> dict[str, Any]:
-    """Return a comparison as plain data for programs.
+    """Return a comparison as plain data for programs, in SI and degrees.
 
-    Returns
-    -------
-    dict
-        SI and degrees. Lists of values are in the order of ``runs``; differences are against the
-        first, whose own are null.
+    Lists of values are in the order of ``runs``; differences are against the first, whose own are
+    null.
     """
     data = {
         "schema": "strapdown compare 1",
@@ -618,35 +607,50 @@ def comparison_json(result: RunComparison) -> dict[str, Any]:
                 "vehicles": len(run.parts),
                 "ran_for_comparison": run.ran,
                 "changed_after_sealing": [
-                    {"file": str(one.file), "code": one.code}
-                    for part in run.parts
-                    for one in part.changed
+                    {"file": str(one.file), "code": one.code} for one in run.changed
                 ],
                 "strapdown": run.parts[0].manifest["versions"].get("strapdown"),
             }
             for run in result.runs
         ],
-        "options": [{"key": row.key, "values": list(row.values)} for row in result.options],
+        "options": [{"key": row.key, "values": row.values} for row in result.options],
         "equal_options": result.equal_options,
         "inputs": [
             {
                 "role": row.role,
                 "same": row.same,
-                "status": list(row.status),
+                "status": row.status,
                 "files": [
-                    None if f is None else {"name": f[0], "sha256": f[1], "bytes": f[2]}
-                    for f in row.files
+                    file and dict(zip(("name", "sha256", "bytes"), file, strict=True))
+                    for file in row.files
                 ],
             }
             for row in result.inputs
         ],
-        "conditions": [{"name": row.name, "values": list(row.values)} for row in result.conditions],
-        "numbers": [_plain_row(row) for row in result.numbers],
+        "conditions": [{"name": row.name, "values": row.values} for row in result.conditions],
+        "numbers": [
+            {
+                "key": row.key,
+                "group": row.any.group,
+                "quantity": row.any.label,
+                "kind": row.any.kind,
+                "unit": row.any.unit,
+                "values": [one and one.value for one in row.values],
+                "below_95": [one and one.below for one in row.values],
+                "above_95": [one and one.above for one in row.values],
+                "difference_unit": row.difference_unit,
+                "differences": row.differences,
+                "combined_95": row.combined,
+                "within": row.within,
+                "same": row.same,
+            }
+            for row in result.numbers
+        ],
         "findings_of_runs": [
             {
                 "code": one.code,
                 "severity": one.severity,
-                "counts": list(one.counts),
+                "counts": one.counts,
                 "differs": one.differs,
                 "sentence": one.sentence,
             }
@@ -655,29 +659,10 @@ def comparison_json(result: RunComparison) -> dict[str, Any]:
         "differences": [
             {"run": result.runs[one.run].name, **plain_scores(one)} for one in result.differences
         ],
-        "seconds": list(result.seconds),
+        "seconds": result.seconds,
         "findings": [one.plain("cli") for one in result.findings],
     }
     return finite(data)
-
-
-def _plain_row(row: NumberRow) -> dict[str, Any]:
-    about = row.any
-    return {
-        "key": row.key,
-        "group": about.group,
-        "quantity": about.label,
-        "kind": about.kind,
-        "unit": about.unit,
-        "values": [None if one is None else one.value for one in row.values],
-        "below_95": [None if one is None else one.below for one in row.values],
-        "above_95": [None if one is None else one.above for one in row.values],
-        "difference_unit": row.difference_unit,
-        "differences": list(row.differences),
-        "combined_95": list(row.combined),
-        "within": list(row.within),
-        "same": row.same,
-    }
 
 
 # The sealed folder.

@@ -125,17 +125,9 @@ def _panel(result: RunComparison, own: Sequence[Difference], name: str, two: boo
         if name in ("heading", "roll"):
             value = break_jumps(value)
         other = result.runs[one.run].name
-        at, value_shown = broken(time, value)
-        lines.append(
-            curve(
-                "difference" if two else other,
-                at,
-                value_shown,
-                colour,
-                width=1.5,
-                buckets=BUCKETS_OVER_TIME,
-            )
-        )
+        at, value = broken(time, value)
+        text = "difference" if two else other
+        lines.append(curve(text, at, value, colour, width=1.5, buckets=BUCKETS_OVER_TIME))
         if f"{name}_combined" not in one.table:
             continue
         combined, first, last = (
@@ -166,11 +158,8 @@ def _panel(result: RunComparison, own: Sequence[Difference], name: str, two: boo
 
 def _plan_chart(result: RunComparison, label: str, end: str) -> Chart | None:
     """All tracks from above, in the level plane at the begin of the first."""
-    found = []
-    for k, tracks in enumerate(result.tracks):
-        one = next((t for t in tracks if t.label == label and t.kind != "attitude"), None)
-        if one is not None:
-            found.append((k, one))
+    own = [[t for t in one if t.label == label and t.kind != "attitude"] for one in result.tracks]
+    found = [(k, tracks[0]) for k, tracks in enumerate(own) if tracks]
     if len(found) < 2 or len({one.frame for _, one in found}) > 1:
         return None
     origin = None
@@ -194,11 +183,8 @@ def _plan_chart(result: RunComparison, label: str, end: str) -> Chart | None:
     for (k, time, _, _), (east, north) in zip(paths, drawn, strict=True):
         colour, dash = _style(k)
         width = 2.6 if not lines else 1.6
-        lines.append(
-            Line(
-                result.runs[k].name, east, north, colour, dash if k else "solid", width, stamps=time
-            )
-        )
+        name, dash = result.runs[k].name, dash if k else "solid"
+        lines.append(Line(name, east, north, colour, dash, width, stamps=time))
     lines += path_marks(paths[0][1], drawn, view, BLACK)
     names = ("forward", "right") if found[0][1].frame == VEHICLE else ("north", "east")
     title = f"Paths of {label}" if label else "Paths"
@@ -232,17 +218,12 @@ def _attitude_chart(result: RunComparison) -> Chart | None:
             style = look(algorithms.index(one.label))
             time = one.table.index.to_numpy(dtype=np.float64)
             at, angle = broken(time, one.table["angle"].to_numpy())
-            lines.append(
-                curve(
-                    one.label, at, angle, style["colour"], style["dash"], buckets=BUCKETS_OVER_TIME
-                )
-            )
+            colour, dash = style["colour"], style["dash"]
+            lines.append(curve(one.label, at, angle, colour, dash, buckets=BUCKETS_OVER_TIME))
         title = result.runs[k].name if len(result.runs) > 2 else ""
         panels.append(Panel("angle between, deg", tuple(lines), title=title))
-    first = result.runs[0].name
-    return Chart(
-        "attitude", "Attitudes", f"Against {first}, by algorithm.", "time, s", tuple(panels)
-    )
+    caption = f"Against {result.runs[0].name}, by algorithm."
+    return Chart("attitude", "Attitudes", caption, "time, s", tuple(panels))
 
 
 def _sweep_chart(result: RunComparison) -> Chart | None:

@@ -6,24 +6,25 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from strapdown import __version__
 from strapdown.config.toml_file import shown
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.report.compare_charts import charts, in_units, quantity_words
 from strapdown.report.compare_numbers import Value
-from strapdown.report.compare_tracks import QUANTITIES
+from strapdown.report.compare_tracks import QUANTITIES, DifferenceScore
 from strapdown.report.document import (
     Block,
     Document,
     Facts,
-    Items,
     KeyFigure,
     KeyFigures,
     Paragraph,
     TableBlock,
+    document_of,
     findings_list,
+    listed,
     run_again,
     section,
+    table_of,
 )
 from strapdown.report.values import (
     GAP,
@@ -74,15 +75,22 @@ def headline(result: RunComparison) -> str:
     said = [f"{len(runs)} runs of {' and '.join(commands)}."]
     keys = [row.key for row in result.options]
     if not keys:
-        said.append(
-            "All options are the same." if result.same_command else "No common option differs."
-        )
+        same = result.same_command
+        said.append("All options are the same." if same else "No common option differs.")
     else:
         few = ", ".join(keys[:3]) + (f" and {len(keys) - 3} more" if len(keys) > 3 else "")
         said.append(
             f"{len(keys)} {'option differs' if len(keys) == 1 else 'options differ'}: {few}."
         )
-    said.append(_inputs_words(result))
+    other = [row.role for row in result.inputs if not row.same]
+    if not result.inputs:
+        said.append("No run has input files.")
+    elif other:
+        said.append(f"Other inputs: {', '.join(dict.fromkeys(other))}.")
+    elif any("renamed" in row.status for row in result.inputs):
+        said.append("The inputs have the same bytes, under other names.")
+    else:
+        said.append("The inputs are the same.")
     if result.same_command and result.numbers:
         said.append(_numbers_words(result))
     for one in result.differences:
@@ -92,14 +100,18 @@ def headline(result: RunComparison) -> str:
             if score.largest < SAME_PLACE:
                 said.append(f"{of}Horizontal positions{vehicle} are the same at all times.")
                 continue
-            within = ""
-            if score.share is not None:
-                within = f", within their bounds {share_words(score.share)} of the time"
+            within = f", {shares}" if (shares := _within_words(score)) else ""
             said.append(
                 f"{of}Horizontal positions{vehicle} differ by {length_words(score.rms)} (rms), "
                 f"{length_words(score.largest)} at most{within}."
             )
     return " ".join(said)
+
+
+def _within_words(score: DifferenceScore) -> str:
+    """Share of the time within the bounds; empty without bounds."""
+    share = score.share
+    return "" if share is None else f"within their bounds {share_words(share)} of the time"
 
 
 def _numbers_words(result: RunComparison) -> str:
@@ -116,18 +128,6 @@ def _numbers_words(result: RunComparison) -> str:
     return f"{words}; {finer} more by less than is shown." if finer else f"{words}."
 
 
-def _inputs_words(result: RunComparison) -> str:
-    rows = result.inputs
-    if not rows:
-        return "No run has input files."
-    other = [row.role for row in rows if not row.same]
-    if other:
-        return f"Other inputs: {', '.join(dict.fromkeys(other))}."
-    if any("renamed" in row.status for row in rows):
-        return "The inputs have the same bytes, under other names."
-    return "The inputs are the same."
-
-
 def compare_document(result: RunComparison, name: str) -> Document:
     """Return the page of a comparison; `name`: that of its folder."""
     drawn = {chart.slug: chart for chart in charts(result)}
@@ -137,43 +137,43 @@ def compare_document(result: RunComparison, name: str) -> Document:
     same = sum(row.same for row in result.numbers)
     whole = numbers_block(result, every=True) if several else None
     count = f"All {len(result.numbers)} numbers ({same} are the same)"
+    codes = codes_block(result) or Paragraph("None.")
     sections = [
         section("options", "Options that differ", *_options(result)),
         section("inputs", "Inputs", inputs_block(result) or Paragraph("None: simulations.")),
         section("numbers", "Numbers that differ", *_numbers(result)) if several else None,
         section("time", "Differences over time", scores_block(result), *over),
         section("plan", "Plan", *plans),
-        section("findings", "Findings that not all runs have", *_codes(result))
-        if several
-        else None,
+        section("findings", "Findings that not all runs have", codes) if several else None,
         section("all", count, whole, folded=True),
-        section("conditions", "Versions and platform", *_conditions(result), folded=True),
+        section(
+            "conditions",
+            "Versions and platform",
+            conditions_block(result) or Paragraph("The same."),
+            folded=True,
+        ),
         section("seconds", "Time taken, indicative", seconds_block(result), folded=True),
         section("runs", "Runs and their seals", _runs_block(result), folded=True),
-        section("method", "Method", Items(tuple(("", text) for text in METHOD)), folded=True),
+        section("method", "Method", listed(METHOD), folded=True),
         section("again", "Check this folder", *run_again(name)),
     ]
-    facts = tuple((f"Run {k}", _described(result, k - 1)) for k in range(1, len(result.runs) + 1))
-    return Document(
-        " | ".join(run.name for run in result.runs),
+    facts = []
+    for k, run in enumerate(result.runs, start=1):
+        ran = ", run for this comparison" if run.ran else ""
+        changed = " – changed after it was sealed" if run.changed else ""
+        facts.append((f"Run {k}", f"{run.name} ({run.command}{ran}){changed}"))
+    return document_of(
+        " | ".join(_names(result)),
         "Results compared",
-        (*facts, ("Software", f"strapdown {__version__}")),
-        tuple(front(result)),
-        tuple(one for one in sections if one is not None and one.blocks),
+        facts,
+        front(result),
+        (one for one in sections if one is not None and one.blocks),
         links=(("compare.json", "all of it, for programs"),),
     )
 
 
-def _described(result: RunComparison, k: int) -> str:
-    run = result.runs[k]
-    ran = ", run for this comparison" if run.ran else ""
-    changed = " – changed after it was sealed" if run.changed else ""
-    return f"{run.name} ({run.command}{ran}){changed}"
-
-
 def front(result: RunComparison) -> Iterator[Block]:
     """Yield the answer: warnings, a few sentences, key numbers."""
-    warnings = [one for one in result.findings if one.severity != "note"]
     if result.changed:
         names = ", ".join(run.name for run in result.runs if run.changed)
         yield Paragraph(
@@ -181,15 +181,13 @@ def front(result: RunComparison) -> Iterator[Block]:
             "warning",
         )
     yield Paragraph(headline(result), "lead")
-    figures = tuple(_figures(result))
-    if figures:
+    if figures := tuple(_figures(result)):
         yield KeyFigures(figures)
-    if warnings:
-        listed = findings_list(warnings, "cli")
-        yield listed
-    notes = [one for one in result.findings if one.severity == "note"]
-    for note in notes:
-        yield Paragraph(f"{note.sentence('cli')}.".replace("..", "."), "note")
+    if warnings := [one for one in result.findings if one.severity != "note"]:
+        yield findings_list(warnings, "cli")
+    for note in result.findings:
+        if note.severity == "note":
+            yield Paragraph(f"{note.sentence('cli')}.".replace("..", "."), "note")
 
 
 def _figures(result: RunComparison) -> Iterator[KeyFigure]:
@@ -201,17 +199,12 @@ def _figures(result: RunComparison) -> Iterator[KeyFigure]:
             if (score := one.score(quantity)) is None:
                 continue
             name = QUANTITIES[quantity][0]
-            note = (
-                ""
-                if score.share is None
-                else f"within their bounds {share_words(score.share)} of the time"
-            )
             yield KeyFigure(
                 f"{name[0].upper()}{name[1:]}{of}",
-                f"{_amount(score.rms, score.unit)}",
+                _amount(score.rms, score.unit),
                 f"rms of the difference; {_amount(score.largest, score.unit)} at most, at "
                 f"{_time(score.largest_at)}",
-                note,
+                _within_words(score),
             )
     for row in result.numbers:
         if row.key.endswith((".delta_v_m_per_s", ".pdof_deg")) and row.key.startswith(
@@ -220,14 +213,14 @@ def _figures(result: RunComparison) -> Iterator[KeyFigure]:
             if ".recorders." in row.key or row.differences[1] is None:
                 continue
             factor, unit = _scale(row, result.units)
-            half = (
-                "" if row.combined[1] is None else f"{half_words(factor * row.combined[1])} {unit}"
-            )
-            words = {True: "within ± ", False: "outside ± ", None: ""}[row.within[1]]
+            bound = "difference"
+            if (half := row.combined[1]) is not None:
+                words = {True: "within ± ", False: "outside ± ", None: ""}[row.within[1]]
+                bound += f", {words}{half_words(factor * half)} {unit}"
             yield KeyFigure(
                 f"{row.any.label[0].upper()}{row.any.label[1:]}",
                 f"{_signed(factor * row.differences[1])} {unit}",
-                f"difference, {words}{half}" if half else "difference",
+                bound,
             )
 
 
@@ -236,10 +229,8 @@ def _figures(result: RunComparison) -> Iterator[KeyFigure]:
 
 def options_block(result: RunComparison) -> TableBlock | None:
     """Return the options that differ, side by side."""
-    if not result.options:
-        return None
-    rows = tuple((row.key, *map(_option, row.values)) for row in result.options)
-    return TableBlock(("option", *_names(result)), rows, text=_all_text(result))
+    rows = ((row.key, *map(_option, row.values)) for row in result.options)
+    return table_of(("option", *_names(result)), rows, text=_all_text(result))
 
 
 def _options(result: RunComparison) -> Iterator[Block | None]:
@@ -260,14 +251,6 @@ def _numbers(result: RunComparison) -> Iterator[Block | None]:
         yield Paragraph("None.")
 
 
-def _codes(result: RunComparison) -> Iterator[Block]:
-    yield codes_block(result) or Paragraph("None.")
-
-
-def _conditions(result: RunComparison) -> Iterator[Block]:
-    yield conditions_block(result) or Paragraph("The same.")
-
-
 def _option(value: Any) -> str:
     if value is None:
         return NONE
@@ -276,25 +259,18 @@ def _option(value: Any) -> str:
 
 def inputs_block(result: RunComparison) -> TableBlock | None:
     """Return the inputs, and whether they have the same bytes."""
-    if not result.inputs:
-        return None
+    said = {
+        "first": "{}",
+        "same": "same bytes",
+        "renamed": "{}: same bytes, other name",
+        "changed": "{}: other bytes",
+    }
     rows = []
     for row in result.inputs:
-        cells = []
-        for file, status in zip(row.files, row.status, strict=True):
-            if file is None:
-                cells.append(NONE)
-            elif status == "first":
-                cells.append(file[0])
-            else:
-                words = {
-                    "same": "same bytes",
-                    "renamed": f"{file[0]}: same bytes, other name",
-                    "changed": f"{file[0]}: other bytes",
-                }
-                cells.append(words[status])
+        pairs = zip(row.files, row.status, strict=True)
+        cells = (NONE if file is None else said[how].format(file[0]) for file, how in pairs)
         rows.append((row.role, *cells))
-    return TableBlock(("input", *_names(result)), tuple(rows), text=_all_text(result))
+    return table_of(("input", *_names(result)), rows, text=_all_text(result))
 
 
 def numbers_block(
@@ -320,12 +296,10 @@ def numbers_block(
             strong.append(len(rows))
             rows.append((group or "Result", *("" for _ in columns[1:])))
         rows.append(tuple(_cells(row, result, two))[: len(columns)])
-    if not rows:
-        return None
     caption = "Difference: a run minus the first."
     if not two:
         caption = "In brackets: minus the first; ! outside the 95 % bound of the difference."
-    return TableBlock(tuple(columns), tuple(rows), (0,), caption, tuple(strong))
+    return table_of(columns, rows, caption, strong=strong)
 
 
 def hidden_numbers(result: RunComparison) -> int:
@@ -378,39 +352,29 @@ def shown_row(row: NumberRow, system: str | None) -> dict[str, Any]:
 
 
 def _cells(row: NumberRow, result: RunComparison, two: bool) -> Iterator[str]:
-    factor, unit = _scale(row, result.units)
-    label = row.any.label
-    yield f"{label}, {unit}" if unit and row.any.kind not in ("lat", "lon") else label
-    places = _places(row, factor)
-    for k, value in enumerate(row.values):
-        text = _value(value, factor, places)
-        if not two and k:
-            text += _in_brackets(row, k, factor)
+    said = shown_row(row, result.units)
+    metres = f"{GAP}m" if row.any.kind in ("lat", "lon") else ""
+    yield f"{row.any.label}, {said['unit']}" if said["unit"] else row.any.label
+    # Of equal places, "same" has no unit.
+    apart = [
+        text + (metres if text and number else "")
+        for text, number in zip(said["differences"], row.differences, strict=True)
+    ]
+    for k, (value, bound) in enumerate(zip(said["values"], said["bounds"], strict=True)):
+        text = f"{value} {bound}{metres if bound else ''}".strip()
+        if not two and k and apart[k] and not _is_word(row, k):
+            text += f" ({apart[k]}{' !' if row.within[k] is False else ''})"
         yield text
     if two:
-        yield _difference(row, 1, factor)
-        half = row.combined[1]
-        if half is None:
-            yield ""
-        else:
-            word = "within" if row.within[1] else "outside"
-            metres = f"{GAP}m" if row.any.kind in ("lat", "lon") else ""
-            yield f"{word} ± {half_words(factor * half)}{metres}"
+        yield apart[1]
+        word = "within" if row.within[1] else "outside"
+        half = said["combined"][1].replace(f"±{GAP}", "± ")
+        yield f"{word} {half}{metres}" if half else ""
 
 
-def _in_brackets(row: NumberRow, k: int, factor: float) -> str:
+def _is_word(row: NumberRow, k: int) -> bool:
     own = row.values[k]
-    if own is None or row.values[0] is None or isinstance(own.value, str):
-        return ""
-    said = _difference(row, k, factor)
-    mark = " !" if row.within[k] is False else ""
-    return f" ({said}{mark})" if said else ""
-
-
-def _difference(row: NumberRow, k: int, factor: float) -> str:
-    said = _apart(row, k, factor)
-    metres = f"{GAP}m" if row.any.kind in ("lat", "lon") and row.differences[k] else ""
-    return f"{said}{metres}"
+    return own is not None and isinstance(own.value, str)
 
 
 def _apart(row: NumberRow, k: int, factor: float) -> str:
@@ -436,16 +400,6 @@ def _apart(row: NumberRow, k: int, factor: float) -> str:
     return _signed(factor * apart)
 
 
-def _value(value: Value | None, factor: float, places: int) -> str:
-    if value is None:
-        return NONE
-    said, bound = shown_value(value, factor, places)
-    if not bound:
-        return said
-    ground = f"{GAP}m" if value.kind in ("lat", "lon") else ""
-    return f"{said} {bound}{ground}" if said else f"{bound}{ground}"
-
-
 def shown_value(value: Value, factor: float, places: int) -> tuple[str, str]:
     """Format a value and its bound, as `bounded`; `places`: decimals of one without a bound.
 
@@ -463,15 +417,11 @@ def shown_value(value: Value, factor: float, places: int) -> tuple[str, str]:
     shown = factor * value.value
     if below is not None and above is not None and not math.isinf(min(below, above)):
         return bounded(shown, factor * below, factor * above)
-    if value.kind == "count" or _is_whole(shown):
+    if value.kind == "count" or (shown == round(shown) and abs(shown) < 1e6):
         return plain(shown, 0), ""
     if abs(shown) < 0.5 * 10.0**-places:
         return (_tiny(shown) if abs(shown) > ROUNDING else "0"), ""
     return plain(shown, places), ""
-
-
-def _is_whole(value: float) -> bool:
-    return value == round(value) and abs(value) < 1e6
 
 
 def _scale(row: NumberRow, system: str | None) -> tuple[float, str]:
@@ -495,23 +445,14 @@ def _scale(row: NumberRow, system: str | None) -> tuple[float, str]:
 
 def _places(row: NumberRow, factor: float) -> int:
     """Decimals that show the bound to two digits, and without one the difference."""
-    halves = [
-        factor * h
-        for v in row.values
-        if v is not None
-        for h in (v.below, v.above)
-        if h is not None and math.isfinite(h) and h > 0.0
-    ]
+    known = [v for v in row.values if v is not None]
+    halves = [h for v in known for h in (v.below, v.above) if h is not None and 0.0 < h < math.inf]
     if halves:
-        return decimals(min(halves), 2, most=6)
-    values = [
-        factor * abs(v.value)
-        for v in row.values
-        if v is not None and isinstance(v.value, float | int) and v.value
-    ]
-    apart = [factor * abs(d) for d in row.differences if d]
-    least = decimals(max(values), 4, most=6) if values else 2
-    return max(least, decimals(min(apart), 2, most=6)) if apart else least
+        return decimals(factor * min(halves), 2, most=6)
+    sizes = [abs(v.value) for v in known if isinstance(v.value, float | int) and v.value]
+    apart = [abs(d) for d in row.differences if d]
+    least = decimals(factor * max(sizes), 4, most=6) if sizes else 2
+    return max(least, decimals(factor * min(apart), 2, most=6)) if apart else least
 
 
 def _signed(value: float) -> str:
@@ -563,14 +504,14 @@ def scores_block(result: RunComparison) -> TableBlock | None:
                     NONE if score.share is None else share_words(score.share),
                 )
             )
-    columns = ("", "rms", "largest", "at", "95 % bound, rms", "time within")
+    columns = "| rms | largest | at | 95 % bound, rms | time within"
     ends = [(one.table.index[0], one.table.index[-1]) for one in result.differences]
     spans = {f"{_time(float(a)).removesuffix(f'{GAP}s')} to {_time(float(b))}" for a, b in ends}
     caption = (
         f"Minus {result.runs[0].name}, {' and '.join(sorted(spans))}; the bound is that of the "
         "difference."
     )
-    return TableBlock(columns, tuple(rows), (0, 3), caption, tuple(strong))
+    return table_of(columns, rows, caption, text=(0, 3), strong=strong)
 
 
 def _time(time: float) -> str:
@@ -591,34 +532,23 @@ def _digits(value: float) -> str:
 
 def codes_block(result: RunComparison) -> TableBlock | None:
     """Return the findings that some runs have and others do not."""
-    found = [one for one in result.codes if one.differs]
-    if not found:
-        return None
-    rows = tuple(
-        (
-            one.severity,
-            one.code,
-            *(("yes" if n == 1 else f"{n} times") if n else NONE for n in one.counts),
-            one.sentence,
-        )
-        for one in found
-    )
+    rows = []
+    for one in result.codes:
+        if one.differs:
+            counts = (("yes" if n == 1 else f"{n} times") if n else NONE for n in one.counts)
+            rows.append((one.severity, one.code, *counts, one.sentence))
     columns = ("", "code", *_names(result), "what it says")
-    return TableBlock(columns, rows, text=tuple(range(len(columns))))
+    return table_of(columns, rows, text=range(len(columns)))
 
 
 def conditions_block(result: RunComparison) -> TableBlock | None:
     """Return versions and properties of the platform that differ."""
-    if not result.conditions:
-        return None
-    rows = tuple((row.name, *(_condition(v) for v in row.values)) for row in result.conditions)
-    return TableBlock(("", *_names(result)), rows, text=_all_text(result))
-
-
-def _condition(value: str | None) -> str:
-    if value is None:
-        return NONE
-    return f"{value[:12]}…" if len(value) == 64 else value
+    rows = []
+    for row in result.conditions:
+        # Of a digest the begin.
+        cells = (NONE if v is None else f"{v[:12]}…" if len(v) == 64 else v for v in row.values)
+        rows.append((row.name, *cells))
+    return table_of(("", *_names(result)), rows, text=_all_text(result))
 
 
 def seconds_block(result: RunComparison) -> TableBlock | None:
@@ -632,7 +562,7 @@ def seconds_block(result: RunComparison) -> TableBlock | None:
     ]
     total = tuple(f"{sum(one.values()):.2f} s" if one else NONE for one in result.seconds)
     rows.append(("in all", *total))
-    return TableBlock(("stage", *_names(result)), tuple(rows), strong=(len(rows) - 1,))
+    return table_of(("stage", *_names(result)), rows, strong=(len(rows) - 1,))
 
 
 def _runs_block(result: RunComparison) -> Facts:

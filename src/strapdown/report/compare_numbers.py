@@ -140,6 +140,14 @@ def _row(
         yield Value(key, group, label, value, unit, **more)
 
 
+def _rows(
+    node: Any, key: str, group: str, *rows: tuple[str, str, str], **more: Any
+) -> Iterator[Value]:
+    """Yield the numbers of a table by their names, labels and units; `key`: before the names."""
+    for name, label, unit in rows:
+        yield from _row(f"{key}{name}", group, label, _number(node, name), unit, **more)
+
+
 def _within(node: Any, key: str) -> dict[str, float]:
     """Half widths to the ends ``low`` and ``high`` of a table with a value; open where null."""
     value, low, high = (_number(node, key, name) for name in ("value", "low", "high"))
@@ -159,22 +167,22 @@ def _navigate(part: RunPart) -> Iterator[Value]:
     integrity = part.json("verdict.json")
     yield from _row("answer.verdict", "Answer", "verdict", _word(data, "trust", "verdict"))
     shares = {key: _number(integrity, "heading", "share", key) for key in STATUSES}
-    for key, share in shares.items():
-        label = f"time with heading {key}"
-        yield from _row(
-            f"integrity.heading.{key}", "Integrity", label, _percent(share), "%", kind="share"
-        )
+    of_time = [(f"heading.{key}", f"heading {key}", share) for key, share in shares.items()]
     at_end = _word(integrity, "heading", "at_end")
-    yield from _row("integrity.heading.at_end", "Integrity", "heading at the end", at_end)
-    for name, one in _table(integrity, "quantities").items():
-        share = _percent(_number(one, "share", "trusted"))
-        label = f"time with {name.replace('_', ' ')} trusted"
-        yield from _row(f"integrity.{name}.trusted", "Integrity", label, share, "%", kind="share")
+    trusted = [
+        (f"{name}.trusted", f"{name.replace('_', ' ')} trusted", _number(one, "share", "trusted"))
+        for name, one in _table(integrity, "quantities").items()
+    ]
+    for rows in (of_time, trusted):
+        for key, words, share in rows:
+            key, label = f"integrity.{key}", f"time with {words}"
+            yield from _row(key, "Integrity", label, _percent(share), "%", kind="share")
+        if rows is of_time:
+            yield from _row("integrity.heading.at_end", "Integrity", "heading at the end", at_end)
     judged = shares_words({key: share for key, share in shares.items() if share is not None})
     note = f"{judged} of the time; final status: {at_end}" if judged and at_end else ""
-    arm = any(
-        _word(one, "code") == "navigation.lever-arm-zero" for one in _tables(data, "findings")
-    )
+    codes = [_word(one, "code") for one in _tables(data, "findings")]
+    arm = "navigation.lever-arm-zero" in codes
     of_arm = "without the lever arm, taken as zero" if arm else ""
     notes = {"end.heading_deg": note, "end.horizontal_m": of_arm}
     for number in _state(_table(data, "end")):
@@ -185,49 +193,35 @@ def _navigate(part: RunPart) -> Iterator[Value]:
     for k, one in enumerate(_tables(data, "gnss_outage_tests"), start=1):
         begin = _number(one, "from_s")
         label = f"outage test {k}" if begin is None else f"outage test from {begin:.6g} s"
-        error = _number(one, "largest_horizontal_error_m")
-        half = _number(one, "bound_95_m")
-        yield from _row(f"outage_test.{k}.m", "Bounds", f"{label}, largest error", error, "m")
-        yield from _row(f"outage_test.{k}.bound_m", "Bounds", f"{label}, its bound", half, "m")
+        for key, name, words in (
+            ("m", "largest_horizontal_error_m", "largest error"),
+            ("bound_m", "bound_95_m", "its bound"),
+        ):
+            key, words = f"outage_test.{k}.{key}", f"{label}, {words}"
+            yield from _row(key, "Bounds", words, _number(one, name), "m")
     yield from _against(data)
-    yield from _row(
-        "path.travelled_m",
+    yield from _rows(
+        _table(data, "trajectory"),
+        "path.",
         "Path",
-        "way over ground",
-        _number(data, "trajectory", "travelled_m"),
-        "m",
+        ("travelled_m", "way over ground", "m"),
+        ("from_s", "begin", "s"),
+        ("to_s", "end", "s"),
     )
-    yield from _row("path.from_s", "Path", "begin", _number(data, "trajectory", "from_s"), "s")
-    yield from _row("path.to_s", "Path", "end", _number(data, "trajectory", "to_s"), "s")
     for stage in ("coarse", "fine"):
         one = _table(data, "alignment", stage)
         yield from _angles(one, f"alignment.{stage}", "Alignment", f"{stage}, ")
     for name, one in _table(data, "sensors").items():
+        value, unit, half = _number(one, "estimate"), _word(one, "unit"), _half(_number(one, "sd"))
+        more = {"half": half, "detail": "bias" not in name}
         label = name.replace("_", " ")
-        yield from _row(
-            f"sensors.{name}",
-            OF_THE_UNIT,
-            label,
-            _number(one, "estimate"),
-            _word(one, "unit") or "",
-            half=_half(_number(one, "sd")),
-            detail="bias" not in name,
-        )
+        yield from _row(f"sensors.{name}", OF_THE_UNIT, label, value, unit or "", **more)
     for name, one in _table(data, "observations").items():
-        for key, label, unit, kind in (
-            ("epochs", "epochs", "", "count"),
-            ("rejected", "rejected", "", "count"),
-            ("rms_in_sd", "innovations, rms in their sd", "", "number"),
-        ):
-            value = _number(one, key)
-            yield from _row(
-                f"observations.{name}.{key}",
-                "Measurements",
-                f"{name}: {label}",
-                value,
-                unit,
-                kind=kind,
-            )
+        group, key = "Measurements", f"observations.{name}."
+        counts = (("epochs", f"{name}: epochs", ""), ("rejected", f"{name}: rejected", ""))
+        yield from _rows(one, key, group, *counts, kind="count")
+        label = f"{name}: innovations, rms in their sd"
+        yield from _rows(one, key, group, ("rms_in_sd", label, ""))
 
 
 def _percent(share: float | None) -> float | None:
@@ -242,32 +236,21 @@ def _state(end: Mapping[str, Any]) -> Iterator[Value]:
     sd = {n: _half(_number(end, f"{n}_sd_m")) for n in NED}
     if lat is not None and lon is not None and alt is not None:
         place = (lat, lon, alt)
-        near: dict[str, Any] = {"place": place, "at": time}
-        yield from _row(
-            "end.lat_deg", group, "latitude", lat, "deg", kind="lat", half=sd["north"], **near
-        )
-        yield from _row(
-            "end.lon_deg", group, "longitude", lon, "deg", kind="lon", half=sd["east"], **near
-        )
+        for kind, label, value, half in (
+            ("lat", "latitude", lat, sd["north"]),
+            ("lon", "longitude", lon, sd["east"]),
+        ):
+            more: dict[str, Any] = {"kind": kind, "half": half, "place": place, "at": time}
+            yield from _row(f"end.{kind}_deg", group, label, value, "deg", **more)
         bound = _number(end, "horizontal_bound_95_m")
-        yield Value(
-            "end.horizontal_m",
-            group,
-            "position, horizontal",
-            None,
-            "m",
-            bound,
-            bound,
-            "horizontal",
-            place,
-            time,
-        )
+        label = "position, horizontal"
+        ends = (bound, bound, "horizontal", place, time)
+        yield Value("end.horizontal_m", group, label, None, "m", *ends)
     yield from _row("end.alt_m", group, "height", alt, "m", half=sd["down"], at=time)
     for name, word in zip(VELOCITY, NED, strict=True):
-        value, half = _number(end, f"{name}_m_per_s"), _half(_number(end, f"{name}_sd_m_per_s"))
-        yield from _row(
-            f"end.{name}_m_per_s", group, f"velocity {word}", value, "m/s", half=half, at=time
-        )
+        half = _half(_number(end, f"{name}_sd_m_per_s"))
+        row = (f"{name}_m_per_s", f"velocity {word}", "m/s")
+        yield from _rows(end, "end.", group, row, half=half, at=time)
     yield from _angles(end, "end", group, "", at=time)
 
 
@@ -275,17 +258,8 @@ def _angles(
     one: Mapping[str, Any], key: str, group: str, head: str, **more: Any
 ) -> Iterator[Value]:
     for name in EULER:
-        value, half = _number(one, f"{name}_deg"), _half(_number(one, f"{name}_sd_deg"))
-        yield from _row(
-            f"{key}.{name}_deg",
-            group,
-            f"{head}{name}",
-            value,
-            "deg",
-            half=half,
-            kind="angle",
-            **more,
-        )
+        half, row = _half(_number(one, f"{name}_sd_deg")), (f"{name}_deg", f"{head}{name}", "deg")
+        yield from _rows(one, f"{key}.", group, row, half=half, kind="angle", **more)
 
 
 #: Endings of the keys of a score, with words.
@@ -309,27 +283,18 @@ def _against(data: Mapping[str, Any]) -> Iterator[Value]:
         words, detail = _WORDS.get(name, name), name not in MAIN_ERRORS
         for ending, unit in _UNITS.items():
             for pattern, what in SCORES:
-                key = pattern.format(ending)
-                more = {"detail": detail or what.startswith("95")}
-                yield from _row(
-                    f"against.{name}.{key}",
-                    group,
-                    f"{words}, {what}",
-                    _number(one, key),
-                    unit,
-                    **more,
-                )
+                row = (pattern.format(ending), f"{words}, {what}", unit)
+                short = detail or what.startswith("95")
+                yield from _rows(one, f"against.{name}.", group, row, detail=short)
         share = _percent(_number(one, "share_within_bound"))
-        label = f"{words}, time within its bound"
-        yield from _row(
-            f"against.{name}.share", group, label, share, "%", kind="share", detail=detail
-        )
+        label, more = f"{words}, time within its bound", {"kind": "share", "detail": detail}
+        yield from _row(f"against.{name}.share", group, label, share, "%", **more)
     label = f"mean NEES (expected {_number(against, 'nees_of') or 0:g})"
-    yield from _row("against.mean_nees", group, label, _number(against, "mean_nees"))
-    points = _table(data, "control_points")
-    for key, what in (("rms_m", "rms"), ("median_m", "median"), ("largest_m", "largest")):
-        label = f"control points, {what}"
-        yield from _row(f"control_points.{key}", group, label, _number(points, key), "m")
+    yield from _rows(against, "against.", group, ("mean_nees", label, ""))
+    points = [
+        (f"{name}_m", f"control points, {name}", "m") for name in ("rms", "median", "largest")
+    ]
+    yield from _rows(_table(data, "control_points"), "control_points.", group, *points)
 
 
 def _align(part: RunPart) -> Iterator[Value]:
@@ -341,29 +306,17 @@ def _align(part: RunPart) -> Iterator[Value]:
     yield from _angles(_table(data, "coarse"), "coarse", "Coarse alignment", "")
     fine = _table(data, "fine")
     for name, unit in (("gyro_bias", "rad/s"), ("accel_bias", "m/s²")):
-        key = f"{name}_{unit.replace('/', '_per_').replace('²', '2')}"
-        spread = f"{name}_sd{key.removeprefix(name)}"
+        ending = unit.replace("/", "_per_").replace("²", "2")
         for k, axis in enumerate("xyz"):
+            value, sd = (_number(fine, f"{name}{of}_{ending}", k) for of in ("", "_sd"))
             label = f"{name.replace('_', ' ')} {axis}"
-            yield from _row(
-                f"fine.{name}_{axis}",
-                OF_THE_UNIT,
-                label,
-                _number(fine, key, k),
-                unit,
-                half=_half(_number(fine, spread, k)),
-            )
-    other = _table(data, "compared_with")
-    yield from _row("against.name", "Errors against the truth", "truth", _word(other, "name"))
+            key, half = f"fine.{name}_{axis}", _half(sd)
+            yield from _row(key, OF_THE_UNIT, label, value, unit, half=half)
+    other, group = _table(data, "compared_with"), "Errors against the truth"
+    yield from _row("against.name", group, "truth", _word(other, "name"))
     for k, name in enumerate(EULER):
-        yield from _row(
-            f"against.{name}_deg",
-            "Errors against the truth",
-            name,
-            _number(other, "off_deg", name),
-            "deg",
-            half=_half(_number(other, "sd_deg", k)),
-        )
+        value, half = _number(other, "off_deg", name), _half(_number(other, "sd_deg", k))
+        yield from _row(f"against.{name}_deg", group, name, value, "deg", half=half)
 
 
 # Attitude.
@@ -373,18 +326,17 @@ def _attitude(part: RunPart) -> Iterator[Value]:
     data = part.answer
     answer = _table(data, "answer")
     group = "Answer"
-    yield from _row("answer.verdict", group, "verdict", _word(answer, "verdict"))
-    yield from _row("answer.algorithm", group, "algorithm", _word(answer, "algorithm"))
-    yield from _row("answer.rate_hz", group, "lowest rate", _number(answer, "rate_hz"), "Hz")
-    label = "lowest rate, decimated"
-    yield from _row("answer.dropped_hz", group, label, _number(answer, "dropped_hz"), "Hz")
-    label = "shortest time within the tolerance"
-    yield from _row("answer.holding_s", group, label, _number(answer, "holding", "shortest_s"), "s")
-    yield from _row(
-        "record.rate_hz", group, "rate of the record", _number(data, "clock", "rate_hz"), "Hz"
-    )
+    for key in ("verdict", "algorithm"):
+        yield from _row(f"answer.{key}", group, key, _word(answer, key))
+    rates = (("rate_hz", "lowest rate", "Hz"), ("dropped_hz", "lowest rate, decimated", "Hz"))
+    yield from _rows(answer, "answer.", group, *rates)
+    label, value = "shortest time within the tolerance", _number(answer, "holding", "shortest_s")
+    yield from _row("answer.holding_s", group, label, value, "s")
+    of_record = ("rate_hz", "rate of the record", "Hz")
+    yield from _rows(_table(data, "clock"), "record.", group, of_record)
     for one in _tables(data, "algorithms"):
         name = _word(one, "algorithm") or "?"
+        head = f"algorithms.{name}."
         for score in _tables(one, "scores"):
             against = _word(score, "against") or "?"
             for key, words in (
@@ -392,47 +344,25 @@ def _attitude(part: RunPart) -> Iterator[Value]:
                 ("rms_deg", "rms"),
                 ("max_deg", "largest"),
             ):
-                yield from _row(
-                    f"algorithms.{name}.{against}.{key}",
-                    f"Errors against {against}",
-                    f"{name}, {words}",
-                    _number(score, key),
-                    "deg",
-                    detail=key == "error_deg",
-                )
-        for axis in EULER:
-            yield from _row(
-                f"algorithms.{name}.final.{axis}_deg",
-                "Attitude at the end",
-                f"{name}, {axis}",
-                _number(one, "final", f"{axis}_deg"),
-                "deg",
-                kind="angle",
-                at=_number(one, "final", "time_s"),
-                detail=True,
-            )
+                place, row = f"{head}{against}.", (key, f"{name}, {words}", "deg")
+                detail = key == "error_deg"
+                yield from _rows(score, place, f"Errors against {against}", row, detail=detail)
+        final = _table(one, "final")
+        angles = [(f"{axis}_deg", f"{name}, {axis}", "deg") for axis in EULER]
+        more: dict[str, Any] = {"kind": "angle", "at": _number(final, "time_s"), "detail": True}
+        yield from _rows(final, f"{head}final.", "Attitude at the end", *angles, **more)
         for key, words in (("own_deg", "algorithm error"), ("sensor_deg", "sensor error")):
-            yield from _row(
-                f"algorithms.{name}.{key}",
-                "Shares of the error",
-                f"{name}, {words}, largest",
-                _number(one, "share", key, "max"),
-                "deg",
-                detail=True,
-            )
+            value, label = _number(one, "share", key, "max"), f"{name}, {words}, largest"
+            yield from _row(head + key, "Shares of the error", label, value, "deg", detail=True)
     for one in _tables(data, "sweep"):
         name, rate = _word(one, "algorithm") or "?", _number(one, "rate_hz")
         meaning = MEANINGS.get(_word(one, "meaning") or "")
         if rate is None or meaning is None:
             continue
-        yield from _row(
-            f"sweep.{meaning}.{name}.{rate:.6g}",
-            f"Errors by algorithm and rate, samples {meaning}",
-            f"{name} at {rate:.6g} Hz",
-            _number(one, "error_deg"),
-            "deg",
-            detail=True,
-        )
+        value, label = _number(one, "error_deg"), f"{name} at {rate:.6g} Hz"
+        group = f"Errors by algorithm and rate, samples {meaning}"
+        key = f"sweep.{meaning}.{name}.{rate:.6g}"
+        yield from _row(key, group, label, value, "deg", detail=True)
 
 
 #: What a lower rate is made of.
@@ -495,24 +425,16 @@ def _crash(part: RunPart) -> Iterator[Value]:
         if alike[index, of, standard] > 1 and isinstance(channels, list):
             name = f"{name}, channels {', '.join(map(str, channels))}"
         label, key = _of_main(one, name, f"indices.{name}", main)
-        factor = SPEEDS["mph"] if unit == "mph" else 1.0
+        factor, unit = (SPEEDS["mph"], "m/s") if unit == "mph" else (1.0, unit)
         value = _number(one, "value")
+        value = None if value is None else factor * value
         more = {k: factor * v for k, v in _within({"": one}, "").items()}
-        yield from _row(
-            key,
-            "Severity",
-            label,
-            None if value is None else factor * value,
-            "m/s" if unit == "mph" else unit,
-            **more,
-        )
+        yield from _row(key, "Severity", label, value, unit, **more)
     yield from _deformation(_table(data, "deformation"), main)
     closure = _table(data, "closure")
     for key, label, unit in CLOSURE:
-        value = _number(closure, key, "value")
-        yield from _row(
-            f"closure.{key}", "The collision", label, value, unit, **_within(closure, key)
-        )
+        value, more = _number(closure, key, "value"), _within(closure, key)
+        yield from _row(f"closure.{key}", "The collision", label, value, unit, **more)
     for one in _tables(data, "references"):
         name, consistent = _word(one, "reference") or "?", _word(one, "consistent")
         yield from _row(f"references.{name}", "References", f"{name}: consistent", consistent)
@@ -572,27 +494,21 @@ def _force(event: Mapping[str, Any], key: str, group: str, head: str) -> Iterato
 def _impact(event: Mapping[str, Any], key: str, group: str) -> Iterator[Value]:
     change, end = _table(event, "body", "event"), "_m_per_s"
     yield from _force(event, key, group, "")
-    clock = _clock(_table(change, "direction_of_force"))
-    yield from _row(f"{key}.clock", group, "clock direction", clock)
+    clock = _at(change, "direction_of_force", "clock")
+    if (hours := _number(clock)) is not None:
+        clock = f"{hours:g} o'clock"
+    said = clock[:LONGEST] if isinstance(clock, str) else None
+    yield from _row(f"{key}.clock", group, "clock direction", said)
     yield from _row(f"{key}.type", group, "type", _word(event, "type"))
     for axis in ("forward", "right", "down"):
         name = f"{axis}{end}"
-        value = _number(change, name, "value")
-        more = _within(change, name)
+        value, more = _number(change, name, "value"), _within(change, name)
         yield from _row(f"{key}.delta_v_{name}", group, f"delta-V {axis}", value, "m/s", **more)
-    peak = _number(event, "peak_m_per_s2")
-    yield from _row(f"{key}.peak_m_per_s2", group, "peak acceleration", peak, "m/s²")
+    peak = ("peak_m_per_s2", "peak acceleration", "m/s²")
+    yield from _rows(event, f"{key}.", group, peak)
     for name, words in (("onset", "begin"), ("contact_end", "end")):
-        time, half = _number(event, f"{name}_s"), _half(_number(event, f"{name}_sd_s"))
-        yield from _row(f"{key}.{name}_s", group, f"{words} of the contact", time, "s", half=half)
-
-
-def _clock(force: Mapping[str, Any]) -> str | None:
-    value = _at(force, "clock")
-    if isinstance(value, str):
-        return value[:LONGEST]
-    number = _number(force, "clock")
-    return None if number is None else f"{number:g} o'clock"
+        half, row = _half(_number(event, f"{name}_sd_s")), (f"{name}_s", f"{words} of the contact")
+        yield from _rows(event, f"{key}.", group, (*row, "s"), half=half)
 
 
 def is_over_ground(data: Mapping[str, Any]) -> bool:
@@ -616,17 +532,12 @@ def _crash_path(answer: Mapping[str, Any], ground: bool) -> Iterator[Value]:
     words |= dict(zip(VELOCITY, (f"velocity {w}" for w in axes), strict=True))
     for name, (ending, unit) in units.items():
         one = f"{name}_{ending}"
-        yield from _row(
-            # Positions in other axes are other quantities.
-            f"path.end.{one}" if ground or name in EULER else f"path.end.vehicle.{one}",
-            group,
-            words.get(name, name),
-            _number(path, "end", one, "value"),
-            unit,
-            kind="angle" if unit == "deg" else "number",
-            at=time,
-            **_within(_table(path, "end"), one),
-        )
+        # Positions in other axes are other quantities.
+        key = f"path.end.{'' if ground or name in EULER else 'vehicle.'}{one}"
+        label, value = words.get(name, name), _number(path, "end", one, "value")
+        more: dict[str, Any] = {"kind": "angle" if unit == "deg" else "number", "at": time}
+        more |= _within(_table(path, "end"), one)
+        yield from _row(key, group, label, value, unit, **more)
 
 
 # Outages and sensors.
@@ -638,80 +549,53 @@ SMALL = 1.0
 def _outage(part: RunPart) -> Iterator[Value]:
     data = part.answer
     group = "At the end of the outage"
-    yield from _row("outage_s", group, "duration of the outage", _number(data, "outage_s"), "s")
-    for key, label, unit in (
+    yield from _rows(data, "", group, ("outage_s", "duration of the outage", "s"))
+    yield from _rows(
+        _table(data, "at_the_end"),
+        "at_the_end.",
+        group,
         ("horizontal_95_m", "horizontal drift, 95 %", "m"),
         ("along_sd_m", "along, sd", "m"),
         ("across_sd_m", "across, sd", "m"),
         ("vertical_sd_m", "vertical, sd", "m"),
         ("speed_sd_m_per_s", "speed, sd", "m/s"),
         ("heading_sd_deg", "heading, sd", "deg"),
-    ):
-        yield from _row(f"at_the_end.{key}", group, label, _number(data, "at_the_end", key), unit)
+    )
     for one in _tables(data, "budget", "sources"):
         name = _word(one, "source") or "?"
         share = _percent(_number(one, "share", "horizontal"))
-        yield from _row(
-            f"budget.{name}.share",
-            "Sources of the drift",
-            f"{name}, share of the variance",
-            share,
-            "%",
-            kind="share",
-            detail=abs(share or 0.0) < SMALL,
-        )
-    yield from _row(
-        "outages.equal_length",
-        "Outages tried",
-        "outages",
-        _number(data, "outages", "equal_length"),
-        kind="count",
-    )
-    yield from _row(
-        "probability",
-        "Outages tried",
-        "probability of drifts as large",
-        _number(data, "probability"),
-    )
+        label, more = f"{name}, share of the variance", {"kind": "share"}
+        detail = abs(share or 0.0) < SMALL
+        key, group = f"budget.{name}.share", "Sources of the drift"
+        yield from _row(key, group, label, share, "%", detail=detail, **more)
+    group, outages = "Outages tried", _table(data, "outages")
+    yield from _rows(outages, "outages.", group, ("equal_length", "outages", ""), kind="count")
+    yield from _rows(data, "", group, ("probability", "probability of drifts as large", ""))
 
 
 def _allan(part: RunPart) -> Iterator[Value]:
-    data = part.answer
-    yield from _row("record.rate_hz", "Record", "rate", _number(data, "record", "rate_hz"), "Hz")
-    for channel, one in _table(data, "channels").items():
+    record = _table(part.answer, "record")
+    yield from _rows(record, "record.", "Record", ("rate_hz", "rate", "Hz"))
+    for channel, one in _table(part.answer, "channels").items():
         base = "rad/s" if channel.startswith("gyro") else "m/s²"
-        units = {
-            "N": f"{base}/√Hz",
-            "Q": f"{base}·s",
-            "K": f"{base}/√s",
-            "R": f"{base}/s",
-            "T": "s",
-        }
-        for name in _table(one, "terms"):
-            yield from _row(
-                f"{channel}.{name}",
-                channel.replace("_", " "),
-                f"{channel}: {name}",
-                _number(one, "terms", name, "value"),
-                units.get(name, base),
-                **_within(_table(one, "terms"), name),
-            )
+        units = {"N": f"{base}/√Hz", "Q": f"{base}·s", "K": f"{base}/√s", "R": f"{base}/s"}
+        units["T"] = "s"
+        terms, group = _table(one, "terms"), channel.replace("_", " ")
+        for name in terms:
+            value, unit = _number(terms, name, "value"), units.get(name, base)
+            key, label = f"{channel}.{name}", f"{channel}: {name}"
+            yield from _row(key, group, label, value, unit, **_within(terms, name))
 
 
 def _calibrate(part: RunPart) -> Iterator[Value]:
     data = part.answer
-    yield from _row("rests", "Record", "rests", _number(data, "rests"), kind="count")
-    yield from _row("excess", "Record", "residuals beyond noise, factor", _number(data, "excess"))
+    yield from _rows(data, "", "Record", ("rests", "rests", ""), kind="count")
+    yield from _rows(data, "", "Record", ("excess", "residuals beyond noise, factor", ""))
     for name, one in _table(data, "parameters").items():
         unit = next((u for head, u in _CALIBRATED.items() if name.startswith(head)), "")
-        yield from _row(
-            f"parameters.{name}",
-            "Errors of the sensor",
-            name.replace("_", " "),
-            _number(one, "value"),
-            unit,
-            half=_half(_number(one, "sd")),
-        )
+        label, value, half = name.replace("_", " "), _number(one, "value"), _number(one, "sd")
+        key, group = f"parameters.{name}", "Errors of the sensor"
+        yield from _row(key, group, label, value, unit, half=_half(half))
 
 
 _CALIBRATED = {
@@ -728,38 +612,25 @@ _CALIBRATED = {
 def _extrinsics(part: RunPart) -> Iterator[Value]:
     for name, one in _table(part.answer, "estimates").items():
         unit = (_word(one, "unit") or "").replace("m/s2", "m/s²")
-        yield from _row(
-            f"estimates.{name}",
-            "Estimates",
-            name.replace("_", " "),
-            _number(one, "value"),
-            unit,
-            half=_number(one, "bound"),
-        )
+        label, value, half = name.replace("_", " "), _number(one, "value"), _number(one, "bound")
+        yield from _row(f"estimates.{name}", "Estimates", label, value, unit, half=half)
 
 
 def _doctor(part: RunPart) -> Iterator[Value]:
     for k, log in enumerate(_tables(part.answer, "logs"), start=1):
-        group = f"Log {k}"
-        yield from _row(f"logs.{k}.name", group, "name", _word(log, "name"))
+        group, head = f"Log {k}", f"logs.{k}."
+        yield from _row(f"{head}name", group, "name", _word(log, "name"))
         for use, one in _table(log, "fit").items():
-            yield from _row(f"logs.{k}.fit.{use}", group, f"fit for {use}", _word(one, "answer"))
+            yield from _row(f"{head}fit.{use}", group, f"fit for {use}", _word(one, "answer"))
         for key in ("questions", "faults", "notes"):
-            yield from _row(
-                f"logs.{k}.{key}", group, key, float(len(_tables(log, key))), kind="count"
-            )
+            count = float(len(_tables(log, key)))
+            yield from _row(head + key, group, key, count, kind="count")
         for one in _tables(log, "streams"):
             name = _word(one, "name") or "?"
-            head = f"logs.{k}.streams.{name}"
-            yield from _row(
-                f"{head}.rows", group, f"{name}: rows", _number(one, "rows"), kind="count"
-            )
-            for key, label, unit in (
-                ("rate_hz", "rate", "Hz"),
-                ("from_s", "begin", "s"),
-                ("to_s", "end", "s"),
-            ):
-                yield from _row(f"{head}.{key}", group, f"{name}: {label}", _number(one, key), unit)
+            key = f"{head}streams.{name}."
+            yield from _rows(one, key, group, ("rows", f"{name}: rows", ""), kind="count")
+            ends = (("rate_hz", "rate", "Hz"), ("from_s", "begin", "s"), ("to_s", "end", "s"))
+            yield from _rows(one, key, group, *((n, f"{name}: {w}", u) for n, w, u in ends))
 
 
 #: Of the commands whose numbers have names and bounds.

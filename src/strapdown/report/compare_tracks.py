@@ -199,13 +199,8 @@ def _crashed(part: RunPart) -> Iterator[Track]:
     if not {*names, *sds} <= set(whole.columns):
         raise DataError("compare.file-damaged", file="trajectory.csv", reason="columns")
     frame = GROUND if is_over_ground(data) else VEHICLE
-    yield Track(
-        part.label,
-        "local",
-        frame,
-        whole[list(names)].rename(columns=names),
-        whole[list(sds)].rename(columns=sds),
-    )
+    table, sd = (whole[list(columns)].rename(columns=columns) for columns in (names, sds))
+    yield Track(part.label, "local", frame, table, sd)
 
 
 def _attitudes(part: RunPart) -> Iterator[Track]:
@@ -446,18 +441,10 @@ def _scores(table: pd.DataFrame) -> tuple[DifferenceScore, ...]:
             if np.isfinite(half).all() and (half > 0.0).any():
                 bound = math.sqrt(float(weight @ half**2))
                 share = float(min(1.0, weight[np.abs(value) <= half].sum()))
-        found.append(
-            DifferenceScore(
-                name,
-                QUANTITIES[name][1],
-                math.sqrt(float(weight @ value**2)),
-                float(abs(value[worst])),
-                float(time[worst]),
-                float(value[-1]),
-                bound,
-                share,
-            )
-        )
+        rms, last = math.sqrt(float(weight @ value**2)), float(value[-1])
+        largest = float(abs(value[worst])), float(time[worst])
+        unit = QUANTITIES[name][1]
+        found.append(DifferenceScore(name, unit, rms, *largest, last, bound, share))
     return tuple(found)
 
 

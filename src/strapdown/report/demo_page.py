@@ -18,6 +18,8 @@ from strapdown.report.document import (
     Paragraph,
     Picture,
     Section,
+    blocks,
+    paragraph,
 )
 from strapdown.report.document_html import document_page
 from strapdown.report.values import decimals, plain
@@ -62,13 +64,7 @@ class Shown:
 
 
 def shown_answer(bundle: Path) -> str:
-    """Return the answer of a bundle in one or two sentences.
-
-    Parameters
-    ----------
-    bundle : Path
-        From `attitude`, `crash`, `navigate` or `outage`.
-    """
+    """Return the answer of a bundle of `attitude`, `crash`, `navigate` or `outage`."""
     kind, result = _result_of(bundle)
     if kind == "attitude":
         return str(result["answer"]["sentence"] if result["answer"] else result["headline"])
@@ -81,17 +77,9 @@ def shown_answer(bundle: Path) -> str:
 
 
 def shown_truth(bundle: Path, records: Path | None = None) -> str | None:
-    """Return the truth or reference of a bundle, and the error of its answer.
+    """Return the truth or reference of a bundle, and the error of its answer; None without one.
 
-    Parameters
-    ----------
-    records : Path, optional
-        Of a simulated crash.
-
-    Returns
-    -------
-    str or None
-        None without a truth or reference.
+    `records`: of a simulated crash.
     """
     kind, result = _result_of(bundle)
     if kind == "attitude":
@@ -104,27 +92,17 @@ def shown_truth(bundle: Path, records: Path | None = None) -> str | None:
 
 
 def demo_page(shown: Sequence[Shown], folder: Path, missing: str | None = None) -> str:
-    """Return the page.
+    """Return the page of runs with their bundles in `folder`: HTML that needs no network.
 
-    Parameters
-    ----------
-    shown : sequence of Shown
-        Runs with their bundles in `folder`.
-    missing : str, optional
-        Missing parts, and the reason.
-
-    Returns
-    -------
-    str
-        HTML that needs no network; identical for the same bundles.
+    Identical for the same bundles. `missing`: missing parts, and the reason.
     """
     document = Document(
         "Results of strapdown, with bounds and references",
         "Three systems: each result with its bound, and its error where the truth is known.",
         (),
-        (
+        blocks(
             Items(tuple((f"{part} · {system}", text) for part, system, text in _PARTS)),
-            *(() if missing is None else (Paragraph(missing, "note"),)),
+            paragraph(missing, "note"),
         ),
         tuple(
             Section(run.slug, f"{run.part} · {run.title}", tuple(_blocks(run, folder)))
@@ -217,12 +195,9 @@ def _withheld_truth(withheld: list[dict[str, Any]]) -> str:
     tried = [w for w in withheld if w["largest_horizontal_error_m"] is not None]
     length = plain(max(w["to_s"] - w["from_s"] for w in tried), 0)
     errors = ", ".join(plain(w["largest_horizontal_error_m"], 1) for w in tried)
-    forward = [w["largest_horizontal_error_forward_m"] for w in tried]
-    before = (
-        ""
-        if None in forward
-        else f" (before smoothing by {', '.join(plain(error, 1) for error in forward)} m)"
-    )
+    forward, before = [w["largest_horizontal_error_forward_m"] for w in tried], ""
+    if None not in forward:
+        before = f" (before smoothing by {', '.join(plain(error, 1) for error in forward)} m)"
     return (
         f"{len(tried)} GNSS outage tests of {length} s: error {errors} m at most{before}, "
         f"consistent with the 95 % bounds in {sum(w['inside'] for w in tried)} of {len(tried)}."

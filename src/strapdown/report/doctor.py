@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from strapdown import __version__
 from strapdown.bundle import write_json
 from strapdown.config.logs import DoctorSpec
 from strapdown.constants import MICRO_G
@@ -34,16 +33,17 @@ from strapdown.report.document import (
     Block,
     Document,
     Facts,
-    Items,
     Paragraph,
     Section,
     TableBlock,
-    blocks,
     capital,
+    document_of,
     findings_list,
+    items_of,
     paragraph,
     run_again,
     section,
+    table_of,
 )
 from strapdown.report.report_bundle import bundle_by_specification, finite, with_page
 from strapdown.report.values import duration_words, instant, small
@@ -107,12 +107,12 @@ def headline(one: LogDiagnosis) -> str:
     by_answer: dict[str, list[str]] = {}
     for use in USES:
         by_answer.setdefault(one.answer(use), []).append(use)
-    parts = [words[a].format(_or(by_answer[a])) for a in words if a in by_answer]
+    parts = []
+    for answer, text in words.items():
+        *others, last = by_answer.get(answer, [""])
+        if last:
+            parts.append(text.format(f"{', '.join(others)} or {last}" if others else last))
     return f"{one.name}: {'; '.join(parts)}."
-
-
-def _or(uses: list[str]) -> str:
-    return " or ".join([", ".join(uses[:-1]), uses[-1]]) if len(uses) > 1 else uses[0]
 
 
 def uses(one: LogDiagnosis) -> tuple[str, ...]:
@@ -211,8 +211,7 @@ def stream_table(one: LogDiagnosis) -> TableBlock | None:
                 _clock(s["clock"], s["clock_origin_s"]),
             )
         )
-    columns = ("stream", "rows", "from", "to", "rate, Hz", "gaps", "clock")
-    return TableBlock(columns, tuple(rows), text=(0, 5, 6)) if rows else None
+    return table_of("stream | rows | from | to | rate, Hz | gaps | clock", rows, text=(0, 5, 6))
 
 
 def _clock(name: str, origin: float) -> str:
@@ -229,32 +228,28 @@ def _stated_axes(one: LogDiagnosis) -> bool:
 
 def channel_table(one: LogDiagnosis) -> TableBlock | None:
     """Source, unit, range, noise and resolution of each channel."""
-    facts = one.data["channels"]
-    if not facts:
-        return None
     sources = {r["quantity"].lstrip("-"): r for r in one.data["read_as"]}
     rows = []
-    for name, c in facts.items():
+    for name, c in one.data["channels"].items():
         factor = math.degrees(1.0) if name in GYRO else 1.0
-        read = sources.get(name)
-        step = c["quantization"]
+        step, column = c["quantization"], "–"
+        if (read := sources.get(name)) is not None:
+            sign = "-" if read["quantity"].startswith("-") else ""
+            column = f"{sign}{read['source']}, {read['unit']}"
         rows.append(
             (
                 name,
-                "–"
-                if read is None
-                else f"{'-' if read['quantity'].startswith('-') else ''}{read['source']}, "
-                f"{read['unit']}",
+                column,
                 f"{factor * c['least']:.4g} to {factor * c['largest']:.4g}",
                 f"{factor * c['noise']:.2g}",
                 "–" if step is None else f"{factor * step:.2g}",
                 ", ".join(dict.fromkeys(c["faults"])) or "none",
             )
         )
-    columns = ("channel", "column, unit", "range", "noise", "step", "faults")
     axes = "Body axes forward, right, down" if _stated_axes(one) else "Axes as in the file"
     caption = f"{axes}. Gyros in deg/s, accelerometers in m/s²."
-    return TableBlock(columns, tuple(rows), text=(0, 1, 5), caption=caption)
+    columns = "channel | column, unit | range | noise | step | faults"
+    return table_of(columns, rows, caption, text=(0, 1, 5))
 
 
 def rest_table(one: LogDiagnosis) -> TableBlock | None:
@@ -278,24 +273,14 @@ def rest_table(one: LogDiagnosis) -> TableBlock | None:
                 f"{max(accel):.3g}" if accel else "–",
             )
         )
-    if not rows:
-        return None
     more = len(one.data["stationary"]) - len(rows)
     caption = (
         "Noise of the noisiest axis: standard deviation, and white noise by second differences."
     )
     caption += f" {more} shorter ones are in doctor.json." if more > 0 else ""
-    columns = (
-        "stationary",
-        "grade",
-        "gyro mean, deg/s",
-        "sd, deg/s",
-        "deg/√h",
-        "force, m/s²",
-        "sd, m/s²",
-        "µg/√Hz",
-    )
-    return TableBlock(columns, tuple(rows), text=(0, 1), caption=caption)
+    columns = "stationary | grade | gyro mean, deg/s | sd, deg/s | deg/√h"
+    columns += " | force, m/s² | sd, m/s² | µg/√Hz"
+    return table_of(columns, rows, caption, text=(0, 1))
 
 
 # The page.
@@ -303,28 +288,20 @@ def rest_table(one: LogDiagnosis) -> TableBlock | None:
 
 def doctor_document(result: Diagnosis, name: str = "") -> Document:
     """Return the report of a diagnosis."""
-    several = len(result.logs) > 1
-    front: list[Block] = []
     sections: list[Section] = []
+    if several := len(result.logs) > 1:
+        between = findings_list(result.between, "cli")
+        sections.append(section("between", "Between the logs", between))
     for k, one in enumerate(result.logs):
-        front += _answer(one)
-        sections += _sections(
-            one, f"{k + 1}-" if several else "", f"{one.name}: " if several else ""
-        )
-    if several:
-        sections.insert(
-            0, section("between", "Between the logs", findings_list(result.between, "cli"))
-        )
+        sections += _sections(one, *((f"{k + 1}-", f"{one.name}: ") if several else ("", "")))
     if name:
         sections.append(section("again", "Check this folder", *run_again(name)))
     title = ", ".join(one.name for one in result.logs)
-    facts = (("Software", f"strapdown {__version__}"),)
-    return Document(
-        title, "Content of the log, and its faults", facts, tuple(front), tuple(sections)
-    )
+    front = (block for one in result.logs for block in _answer(one))
+    return document_of(title, "Content of the log, and its faults", (), front, sections)
 
 
-def _answer(one: LogDiagnosis) -> tuple[Block, ...]:
+def _answer(one: LogDiagnosis) -> tuple[Block | None, ...]:
     shown = uses(one)
     good = not shown or any(one.answer(use) == "yes" for use in shown)
     rows = []
@@ -336,16 +313,16 @@ def _answer(one: LogDiagnosis) -> tuple[Block, ...]:
     ask = answering(one)
     blanks = ", ".join(sorted(PLACEHOLDERS & set((ask or "").split())))
     asked = f"With {blanks} filled in, and" if blanks else "With"
-    items = [
+    faults = [
         (head, f"{capital(text)}. {'Fix: ' + fix + '.' if fix else ''}".strip())
         for head, text, fix in wrong(one)
     ]
-    return blocks(
+    return (
         Paragraph(headline(one), "lead" if good else "warning"),
-        Items(tuple(rows)) if rows else None,
+        items_of(rows),
         paragraph("\n".join(commands), "mono"),
-        Paragraph("Faults, and the remedy of each:" if items else "No fault was found."),
-        Items(tuple(items), numbered=True) if items else None,
+        Paragraph("Faults, and the remedy of each:" if faults else "No fault was found."),
+        items_of(faults, numbered=True),
         paragraph(f"{asked} every question answered as inferred:" if ask else None),
         paragraph(ask, "mono"),
     )
@@ -378,8 +355,8 @@ def _sections(one: LogDiagnosis, slug: str, title: str) -> list[Section]:
         section(
             f"{slug}columns",
             f"{title}Units and axes, with the evidence",
-            Items(tuple(read)) if read else None,
-            Items(tuple(columns)) if columns else None,
+            items_of(read),
+            items_of(columns),
             folded=True,
         ),
         section(f"{slug}notes", f"{title}Notes", findings_list(one.notes, "cli")),

@@ -11,6 +11,7 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from strapdown import __version__
 from strapdown.errors import DataError, Finding, Words
 from strapdown.report.chart import Chart
 
@@ -218,14 +219,63 @@ class Document:
         return _plain(self, _LABEL)
 
 
+def document_of(
+    title: str,
+    subtitle: str,
+    facts: Iterable[tuple[str, str]],
+    front: Iterable[Block | None],
+    sections: Iterable[Section | None],
+    *,
+    footer: str = "",
+    links: Iterable[tuple[str, str]] = (),
+) -> Document:
+    """Make a report of the blocks and sections that there are; its facts end with the software."""
+    return Document(
+        title,
+        subtitle,
+        (*facts, ("Software", f"strapdown {__version__}")),
+        blocks(*front),
+        tuple(one for one in sections if one is not None),
+        footer,
+        tuple(links),
+    )
+
+
 def paragraph(text: str | None, kind: str = "plain") -> Paragraph | None:
     """Make a paragraph if there is a text."""
     return Paragraph(text, kind) if text else None
 
 
+def items_of(rows: Iterable[tuple[str, str]], *, numbered: bool = False) -> Items | None:
+    """Make a list if there are rows."""
+    return Items(found, numbered) if (found := tuple(rows)) else None
+
+
+def listed(texts: Iterable[str]) -> Items:
+    """Make a list without heads."""
+    return Items(tuple(("", text) for text in texts))
+
+
+def table_of(
+    head: str | Sequence[str],
+    rows: Iterable[Sequence[str]],
+    caption: str = "",
+    *,
+    text: Sequence[int] = (0,),
+    strong: Iterable[int] = (),
+    title: str = "",
+) -> TableBlock | None:
+    """Make a table if there are rows; `head`: the columns, as one text with ``|`` between them."""
+    columns = [name.strip() for name in head.split("|")] if isinstance(head, str) else head
+    found = tuple(tuple(row) for row in rows)
+    if not found:
+        return None
+    return TableBlock(tuple(columns), found, tuple(text), caption, tuple(strong), title)
+
+
 def assumed(*texts: str) -> tuple[Block, ...]:
     """Return the assumptions of a report."""
-    return Paragraph("Assumptions:"), Items(tuple(("", text) for text in texts))
+    return Paragraph("Assumptions:"), listed(texts)
 
 
 def run_again(name: str) -> tuple[Block, ...]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from strapdown import __version__, rotation
+from strapdown import rotation
 from strapdown.bundle import write_json
 from strapdown.config.extrinsics import ExtrinsicsSpec
 from strapdown.config.toml_text import array, number, string
@@ -19,7 +19,9 @@ from strapdown.report.document import (
     Items,
     Paragraph,
     TableBlock,
+    document_of,
     findings_list,
+    listed,
     paragraph,
     run_again,
     section,
@@ -148,18 +150,10 @@ def extrinsics_toml(result: ExtrinsicsRun) -> str:
         iron = [one.value for one in _chosen(result, "hard_iron")]
         rows = ", ".join(array([float(x) for x in row]) for row in found.soft_iron)
         lines += ["", "[magnetometer]", f"hard_iron = {array(iron)}", f"soft_iron = [{rows}]"]
-    lines += ["", "[bridge]", *_bridge_lines(result)]
+    lines += ["", "[bridge]", *(f"{k} = {string(text)}" for k, text in bridges(result).items())]
     if found.kind == "gnss":
         lines += ["", *(f"# {line}" if line else "" for line in navigation_lines(result))]
     return "\n".join(lines) + "\n"
-
-
-def _bridge_lines(result: ExtrinsicsRun) -> list[str]:
-    """Lines of `extrinsics.toml` for other programs."""
-    lines = []
-    for key, text in bridges(result).items():
-        lines.append(f"{key} = {string(text)}")
-    return lines
 
 
 def bridges(result: ExtrinsicsRun) -> dict[str, str]:
@@ -181,16 +175,13 @@ def bridges(result: ExtrinsicsRun) -> dict[str, str]:
 
 def navigation_lines(result: ExtrinsicsRun) -> list[str]:
     """Lines of a navigation configuration with what the drive shows of an antenna."""
-    arm = _chosen(result, "lever_arm")
     lines = ["[aiding.gnss]"]
-    if arm:
+    if arm := _chosen(result, "lever_arm"):
         lines.append(f"lever_arm_m = {array([round(one.value, 3) for one in arm])}")
         lines.append(f"lever_arm_sd_m = {array([float(f'{one.sd:.2g}') for one in arm])}")
     for one in _chosen(result, "time_offset"):
-        lines.append(f"time_offset_s = {one.value:.4f}")
-        lines.append(f"time_offset_sd_s = {one.sd:.2g}")
-    mounting = _chosen(result, "mounting")
-    if mounting:
+        lines += [f"time_offset_s = {one.value:.4f}", f"time_offset_sd_s = {one.sd:.2g}"]
+    if mounting := _chosen(result, "mounting"):
         lines += ["", "[aiding.no_slip]"]
         lines += [f"{one.name[9:]}_deg = {one.value / DEG:.3f}" for one in mounting]
         sds = array([float(f"{one.sd / DEG:.2g}") for one in mounting])
@@ -238,7 +229,7 @@ def table(result: ExtrinsicsRun) -> TableBlock:
             state += f", {one.prior_share:.0%} assumed"
         rows.append((words + axis, *_value(one.value, one.bound, factor), unit, state))
     columns = ("parameter", "value", "±, 95 %", "unit", "")
-    return TableBlock(columns, tuple(rows), text=(0, 3, 4), caption="; ".join(CONVENTION) + ".")
+    return TableBlock(columns, tuple(rows), (0, 3, 4), "; ".join(CONVENTION) + ".")
 
 
 def _seen(observed: bool) -> str:
@@ -253,38 +244,32 @@ def _value(value: float, bound: float, factor: float) -> tuple[str, str]:
 
 def extrinsics_document(result: ExtrinsicsRun, name: str = "") -> Document:
     """Return the report of the extrinsics of two sensors."""
-    gnss = result.result.kind == "gnss"
-    rows = tuple(bridges(result).items())
+    found = result.result
+    gnss = found.kind == "gnss"
     lines = "\n".join(navigation_lines(result)) if gnss else None
-    sections = [
+    sections = (
         section("match", "Match", match_chart(result)),
         section("navigation", "For a navigation configuration", paragraph(lines, "mono")),
-        section("bridge", "For another program", Items(rows)),
-        section(
-            "method",
-            "Method",
-            Items(tuple(("", text) for text in (METHOD_GNSS if gnss else METHOD))),
-            folded=True,
-        ),
+        section("bridge", "For another program", Items(tuple(bridges(result).items()))),
+        section("method", "Method", listed(METHOD_GNSS if gnss else METHOD), folded=True),
         section("again", "Check this folder", *run_again(name)),
-    ]
-    found = result.result
-    facts = (
-        ("Used", f"{found.start:.6g} s to {found.end:.6g} s"),
-        ("Software", f"strapdown {__version__}"),
     )
     good = all(one.observed for one in found.estimates)
-    front = (
-        Paragraph(headline(result), "lead" if good else "warning"),
-        table(result),
-        *((findings_list(result.findings, "cli"),) if result.findings else ()),
+    return document_of(
+        result.name,
+        "Extrinsics",
+        (("Used", f"{found.start:.6g} s to {found.end:.6g} s"),),
+        (
+            Paragraph(headline(result), "lead" if good else "warning"),
+            table(result),
+            findings_list(result.findings, "cli") if result.findings else None,
+        ),
+        sections,
+        links=(
+            ("extrinsics.json", "estimates with covariance, SI"),
+            ("extrinsics.toml", "matrices and lines for other programs"),
+        ),
     )
-    links = (
-        ("extrinsics.json", "estimates with covariance, SI"),
-        ("extrinsics.toml", "matrices and lines for other programs"),
-    )
-    used = tuple(one for one in sections if one is not None)
-    return Document(result.name, "Extrinsics", facts, front, used, links=links)
 
 
 def match_chart(result: ExtrinsicsRun) -> Chart:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from strapdown.alignment.alignment import Alignment
 from strapdown.bundle import input_files, write_json
 from strapdown.config.navigation import STAGES, NavigationSpec
 from strapdown.errors import ConfigError
@@ -44,6 +43,7 @@ from strapdown.report.navigation_evaluation import (
 from strapdown.report.paired_corrections import paired_json, write_paired
 from strapdown.report.report_bundle import (
     ReportBundle,
+    alignment_data,
     as_comments,
     file_of,
     finite,
@@ -53,6 +53,7 @@ from strapdown.report.report_bundle import (
 from strapdown.report.values import spaced
 from strapdown.report.verdict import (
     answer,
+    apart,
     check_words,
     first_words,
     promise,
@@ -182,7 +183,7 @@ def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
     """
     result, record, source = evaluation.run, evaluation.record, evaluation.run.source
     time = record.trajectory.index
-    clock = clock_of(source.imu)
+    clock, smoother, points = clock_of(source.imu), evaluation.smoother, result.points
     data = {
         "conventions": as_comments(conventions(result)),
         "answer": spaced(headline(evaluation)),
@@ -205,8 +206,8 @@ def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
             "travelled_m": distance_over_ground(record.trajectory),
         },
         "alignment": {
-            "coarse": _alignment(result.coarse),
-            "fine": None if result.fine is None else _alignment(result.fine.alignment),
+            "coarse": result.coarse and alignment_data(result.coarse),
+            "fine": result.fine and alignment_data(result.fine.alignment),
         },
         "start": _state(evaluation, 0),
         "end": _state(evaluation, -1),
@@ -219,7 +220,15 @@ def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
             }
             for name in record.sensors.columns
         },
-        "smoothing": _smoothing(evaluation),
+        "smoothing": smoother
+        and {
+            name: {
+                "instants": int(smoother.instants[k]),
+                "share_within_3_sd": smoother.share[k],
+                "rms_in_sd": smoother.rms[k],
+            }
+            for k, name in enumerate(smoother.columns)
+        },
         "observations": {one.name: _innovations(one) for one in evaluation.agreements},
         "outages": [
             {
@@ -254,27 +263,23 @@ def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
             {"time_s": e.time, "kind": e.kind, "what": e.finding.what} for e in record.events
         ],
         "against": _against(evaluation),
-        "control_points": _points(evaluation),
+        # After the best fit of origin and heading.
+        "control_points": points
+        and {
+            "points": len(points.time),
+            "points_given": points.given,
+            "path_length_m": points.way,
+            "rms_m": points.rms,
+            "median_m": points.median,
+            "largest_m": points.largest,
+            "largest_at_s": points.largest_at,
+            "turn_deg": points.turn_deg,
+        },
         "paired": paired_json(evaluation),
         "method": _method(result),
         "findings": [f.plain("file") for f in result.findings],
     }
     return finite(data)
-
-
-def _smoothing(evaluation: NavigationEvaluation) -> dict[str, Any] | None:
-    """Agreement of filter and smoother; None for a run without smoothing."""
-    one = evaluation.smoother
-    if one is None:
-        return None
-    return {
-        name: {
-            "instants": int(one.instants[k]),
-            "share_within_3_sd": one.share[k],
-            "rms_in_sd": one.rms[k],
-        }
-        for k, name in enumerate(one.columns)
-    }
 
 
 def _method(result: NavigationRun) -> dict[str, Any]:
@@ -307,23 +312,6 @@ def _against(evaluation: NavigationEvaluation) -> dict[str, Any] | None:
     }
 
 
-def _points(evaluation: NavigationEvaluation) -> dict[str, Any] | None:
-    """Errors at the control points, after the best fit of origin and heading."""
-    score = evaluation.run.points
-    if score is None:
-        return None
-    return {
-        "points": len(score.time),
-        "points_given": score.given,
-        "path_length_m": score.way,
-        "rms_m": score.rms,
-        "median_m": score.median,
-        "largest_m": score.largest,
-        "largest_at_s": score.largest_at,
-        "turn_deg": score.turn_deg,
-    }
-
-
 def _score(score: SolutionScore) -> dict[str, Any]:
     unit = {"m": "m", "m/s": "m_per_s", "deg": "deg"}[score.unit]
     return {
@@ -348,18 +336,6 @@ def _state(evaluation: NavigationEvaluation, row: int) -> dict[str, Any]:
         "sd_at_s": float(record.sd.index[row]),
         **{f"{n}_sd_{units[n]}": how[n] for n in [*NED, *VELOCITY, *EULER]},
         "horizontal_bound_95_m": evaluation.bounds[row],
-    }
-
-
-def _alignment(one: Alignment | None) -> dict[str, Any] | None:
-    if one is None:
-        return None
-    angles, sd = one.roll_pitch_heading, one.sd_deg
-    return {
-        "method": one.method,
-        "time_s": one.time,
-        **{f"{a}_deg": float(angles[k]) for k, a in enumerate(EULER)},
-        **{f"{a}_sd_deg": float(sd[k]) for k, a in enumerate(EULER)},
     }
 
 
@@ -409,9 +385,8 @@ def write_navigation_files(evaluation: NavigationEvaluation, folder: Path) -> No
     _write_states(result, record, folder, comments)
     if result.forward is not None:
         (folder / "forward").mkdir()
-        _write_states(
-            result, result.forward, folder / "forward", {**comments, "by": "filter alone"}
-        )
+        alone = {**comments, "by": "filter alone"}
+        _write_states(result, result.forward, folder / "forward", alone)
     if record.innovations:
         (folder / "innovations").mkdir()
         for name, table in record.innovations.items():
@@ -436,11 +411,8 @@ def write_navigation_files(evaluation: NavigationEvaluation, folder: Path) -> No
             "north_error_m": score.error[:, 0],
             "east_error_m": score.error[:, 1],
         }
-        of_points = {
-            **comments,
-            "sign": "computed minus point, after the fit of origin and heading",
-        }
-        csv.write(folder / "control_points.csv", columns, of_points)
+        sign = "computed minus point, after the fit of origin and heading"
+        csv.write(folder / "control_points.csv", columns, {**comments, "sign": sign})
     if result.differences is not None:
         errors = result.differences.rename(
             columns={c: f"{c}_{UNITS.get(str(c), 'deg')}" for c in result.differences.columns}
@@ -493,25 +465,31 @@ def _column(name: str) -> str:
 def write_integrity(evaluation: NavigationEvaluation, folder: Path) -> None:
     """Write ``verdict.json`` and ``heading_integrity.csv``."""
     write_json(folder / "verdict.json", verdict_json(evaluation))
-    result, heading = evaluation.run, evaluation.run.trust.heading
+    heading = evaluation.run.trust.heading
     table = heading.table
-    status = [STATUSES[k] for k in table["status"].to_numpy(dtype=np.int64)]
+
+    def words(values: Iterable[Any]) -> Any:
+        return np.array([str(value) for value in values], dtype=np.str_)
+
+    def numbers(column: str) -> Array:
+        return table[column].to_numpy(dtype=np.float64)
+
     csv.write(
         folder / "heading_integrity.csv",
         {
             "time_s": index_of(table),
-            "status": np.array(status, dtype=np.str_),
-            "reason": np.array([str(r) for r in table["reason"]], dtype=np.str_),
-            "bound_95_deg": table["bound"].to_numpy(dtype=np.float64),
-            "confirmed_99_deg": table["carried"].to_numpy(dtype=np.float64),
-            "check": np.array([str(w) for w in table["check"]], dtype=np.str_),
-            "check_difference_deg": table["difference"].to_numpy(dtype=np.float64),
-            "check_sd_deg": table["check_sd"].to_numpy(dtype=np.float64),
-            "check_since_s": table["check_since"].to_numpy(dtype=np.float64),
-            "innovation_scatter": table["scatter"].to_numpy(dtype=np.float64),
+            "status": words(STATUSES[k] for k in table["status"].to_numpy(dtype=np.int64)),
+            "reason": words(table["reason"]),
+            "bound_95_deg": numbers("bound"),
+            "confirmed_99_deg": numbers("carried"),
+            "check": words(table["check"]),
+            "check_difference_deg": numbers("difference"),
+            "check_sd_deg": numbers("check_sd"),
+            "check_since_s": numbers("check_since"),
+            "innovation_scatter": numbers("scatter"),
         },
         {
-            "run": result.source.name,
+            "run": evaluation.run.source.name,
             "trusted_below_deg": f"{heading.trusted_below:g}",
             "rejected_beyond_deg": f"{heading.rejected_beyond:g}",
         },
@@ -595,9 +573,7 @@ def _repeated(repeated: Repeated, result: NavigationRun) -> dict[str, Any]:
         "left": [_doubt(i) for i in repeated.left],
     }
     if repeated.differences is not None:
-        table = repeated.differences
-        place = np.hypot(table["north"].to_numpy(), table["east"].to_numpy())
-        turn = np.abs(table["heading"].to_numpy(dtype=np.float64))
+        place, turn = apart(repeated.differences)
         for name, unit, values in (("position", "m", place), ("heading", "deg", turn)):
             out[f"{name}_difference"] = {
                 f"median_{unit}": np.median(values),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -30,16 +33,12 @@ from strapdown.report.chart import (
     break_jumps,
     broken,
     curve,
+    dots,
     kept_rows,
     thin_fill,
 )
 from strapdown.report.chart import BUCKETS_OVER_TIME as BUCKETS
-from strapdown.report.navigation_evaluation import (
-    Agreement,
-    NavigationEvaluation,
-    ShownStates,
-    rejected_times,
-)
+from strapdown.report.navigation_evaluation import Agreement, NavigationEvaluation, rejected_times
 from strapdown.report.values import NOT_ESTIMATED, plain
 from strapdown.tables import EULER, NED, POSITION_SD, VELOCITY
 from strapdown.tables.checks import height_words, index_of
@@ -53,114 +52,74 @@ WIDE = 3.0
 
 
 def over_time(
+    of: NavigationEvaluation | NavigationRecord,
     slug: str,
     title: str,
     caption: str,
-    panels: tuple[Panel, ...],
-    record: NavigationRecord,
+    panels: Sequence[Panel],
     statuses: tuple[Span, ...] = (),
 ) -> Chart:
     """Put panels over time below the strip of modes, measurements and heading status."""
-    above = strip(record, statuses)
+    record = of.record if isinstance(of, NavigationEvaluation) else of
+    above = strip(record, of.heading_spans if isinstance(of, NavigationEvaluation) else statuses)
     # Shaded bands of the outages.
     spans = {(s.begin, s.end) for spans in record.outages.values() for s in spans}
     bands = tuple(Band(begin, end, "outage") for begin, end in sorted(spans))
     told = f"{caption} {SHADED}" if bands else caption
-    return Chart(
-        slug,
-        title,
-        told.strip(),
-        TIME,
-        panels if above is None else (above, *panels),
-        bands=bands,
-    )
+    drawn = panels if above is None else (above, *panels)
+    return Chart(slug, title, told.strip(), TIME, tuple(drawn), bands=bands)
 
 
 def bound_chart(evaluation: NavigationEvaluation) -> Chart:
     """95 % bounds of position, velocity and attitude over the run."""
-    record = evaluation.record
-    time = index_of(record.sd)
-    groups = (
-        (
-            "Position",
-            "m",
-            (
-                ("horizontal", evaluation.bounds, BLUE),
-                _bound(record, "down", "height"),
-            ),
-        ),
-        (
-            "Velocity",
-            "m/s",
-            tuple(_bound(record, v, n) for v, n in zip(VELOCITY, NED, strict=True)),
-        ),
-        ("Attitude", "deg", tuple(_bound(record, a, a) for a in EULER)),
-    )
+    sd = evaluation.record.sd
+    time = index_of(sd)
     panels = []
-    for title, unit, curves in groups:
-        lines = []
-        for k, (name, value, colour) in enumerate(curves):
-            shown = np.where(value > 0.0, value, np.nan)
-            dash = ("solid", "dash", "dot")[k]
+    for title, unit, curves in (
+        ("position", "m", (("horizontal", "", BLUE), ("height", "down", AXIS_COLOURS[0]))),
+        ("velocity", "m/s", zip(NED, VELOCITY, AXIS_COLOURS, strict=True)),
+        ("attitude", "deg", zip(EULER, EULER, AXIS_COLOURS, strict=True)),
+    ):
+        lines, every = [], []
+        for (name, column, colour), dash in zip(curves, ("solid", "dash", "dot"), strict=False):
+            value = evaluation.bounds
+            if column:
+                value = TWO_SIDED_95 * sd[column].to_numpy(dtype=np.float64)
+            every.append(value[value > 0.0])
             if np.isnan(value).all():
                 title += f" ({name} {NOT_ESTIMATED})"
                 continue
+            shown = np.where(value > 0.0, value, np.nan)
             lines.append(curve(name, time, shown, colour, dash, 1.6, buckets=BUCKETS))
-        every = np.concatenate([value[value > 0.0] for _, value, _ in curves])
-        log = bool(every.size and every.max() > WIDE * every.min())
-        panels.append(Panel(f"{title.lower()}, {unit}", tuple(lines), log=log))
+        sizes = np.concatenate(every)
+        log = bool(sizes.size and sizes.max() > WIDE * sizes.min())
+        panels.append(Panel(f"{title}, {unit}", tuple(lines), log=log))
     return over_time(
+        evaluation,
         "bounds",
         "95 % bounds",
         "1.96 standard deviations; of the horizontal position the semi-major axis of its 95 % "
         "ellipse.",
-        tuple(panels),
-        record,
-        evaluation.heading_spans,
+        panels,
     )
-
-
-def _bound(record: NavigationRecord, column: str, name: str) -> tuple[str, Array, str]:
-    colours = dict(zip(["north", "east", "down"], AXIS_COLOURS, strict=True))
-    colours |= dict(zip(VELOCITY, AXIS_COLOURS, strict=True))
-    colours |= dict(zip(EULER, AXIS_COLOURS, strict=True)) | {"down": AXIS_COLOURS[0]}
-    return name, TWO_SIDED_95 * record.sd[column].to_numpy(dtype=np.float64), colours[column]
-
-
-def _level(evaluation: NavigationEvaluation) -> str:
-    """Level from which the heights count."""
-    if evaluation.run.source.heights_as_stated:
-        return f"Heights are {height_words(as_stated=True)}."
-    return f"Above the ellipsoid ({evaluation.run.ellipsoid.name})."
 
 
 def height_chart(evaluation: NavigationEvaluation) -> Chart:
     """Height with its bound."""
+    level = f"Above the ellipsoid ({evaluation.run.ellipsoid.name})."
+    if evaluation.run.source.heights_as_stated:
+        level = f"Heights are {height_words(as_stated=True)}."
     panel = _state_panel(evaluation, "alt", "down", "height, m")
-    return over_time(
-        "height",
-        "Height",
-        _level(evaluation),
-        (panel,),
-        evaluation.record,
-        evaluation.heading_spans,
-    )
+    return over_time(evaluation, "height", "Height", level, (panel,))
 
 
 def velocity_chart(evaluation: NavigationEvaluation) -> Chart:
     """Velocity over ground with its bounds."""
-    panels = tuple(
+    panels = [
         _state_panel(evaluation, name, name, f"{words}, m/s")
         for name, words in zip(VELOCITY, NED, strict=True)
-    )
-    return over_time(
-        "velocity",
-        "Velocity",
-        "Relative to the Earth.",
-        panels,
-        evaluation.record,
-        evaluation.heading_spans,
-    )
+    ]
+    return over_time(evaluation, "velocity", "Velocity", "Relative to the Earth.", panels)
 
 
 def attitude_chart(evaluation: NavigationEvaluation) -> Chart:
@@ -168,14 +127,7 @@ def attitude_chart(evaluation: NavigationEvaluation) -> Chart:
     heading, marks, said = heading_shown(evaluation.record)
     panels = [_state_panel(evaluation, name, name, f"{name}, deg") for name in EULER[:2]]
     panels.append(_state_panel(evaluation, "heading", "heading", "heading, deg", (heading, marks)))
-    return over_time(
-        "attitude",
-        "Attitude",
-        said,
-        tuple(panels),
-        evaluation.record,
-        evaluation.heading_spans,
-    )
+    return over_time(evaluation, "attitude", "Attitude", said, panels)
 
 
 #: A heading that turns by more is drawn within 0 to 360 deg.
@@ -265,34 +217,33 @@ def _true(evaluation: NavigationEvaluation, column: str, navigated: Array) -> Li
 
 def state_charts(evaluation: NavigationEvaluation) -> tuple[Chart, ...]:
     """Estimated sensor and measurement errors that the run observed, with their bounds."""
-    return tuple(
-        _block_chart(evaluation.run.filtered, block, evaluation.heading_spans)
-        for block in evaluation.states
-        if len(evaluation.unobserved(block)) < len(block.columns)
-    )
-
-
-def _block_chart(record: NavigationRecord, block: ShownStates, statuses: tuple[Span, ...]) -> Chart:
+    record, out = evaluation.run.filtered, []
     time = index_of(record.sensors)
-    panels = []
-    for k, (column, label) in enumerate(zip(block.columns, block.labels, strict=True)):
-        told, sd = (_column(table, column) for table in (record.sensors, record.sensors_sd))
-        value, reach = block.factor * told, TWO_SIDED_95 * block.factor * sd
-        colour = AXIS_COLOURS[k % 3]
-        line = curve("estimate", time, value, colour, width=1.6, buckets=BUCKETS)
-        fill: Fill = thin_fill(BOUND, time, value - reach, value + reach, colour)
+    for block in evaluation.states:
         several = len(block.columns) > 1
-        name = f"{label}, {block.unit}" if several else f"{block.name}, {block.unit}"
-        panels.append(Panel(name, (line,), fills=(fill,), height=0.7))
-    return over_time(
-        f"state-{block.slug}",
-        f"{block.name[0].upper()}{block.name[1:]}",
-        "Measured or assumed − true. A state whose bound does not decrease is not observable in "
-        "this motion.",
-        tuple(panels),
-        record,
-        statuses,
-    )
+        if len(evaluation.unobserved(block)) == len(block.columns):
+            continue
+        panels = []
+        for k, (column, label) in enumerate(zip(block.columns, block.labels, strict=True)):
+            told, sd = (_column(table, column) for table in (record.sensors, record.sensors_sd))
+            value, reach = block.factor * told, TWO_SIDED_95 * block.factor * sd
+            colour = AXIS_COLOURS[k % 3]
+            line = curve("estimate", time, value, colour, width=1.6, buckets=BUCKETS)
+            fill = thin_fill(BOUND, time, value - reach, value + reach, colour)
+            name = f"{label if several else block.name}, {block.unit}"
+            panels.append(Panel(name, (line,), fills=(fill,), height=0.7))
+        out.append(
+            over_time(
+                record,
+                f"state-{block.slug}",
+                f"{block.name[0].upper()}{block.name[1:]}",
+                "Measured or assumed − true. A state whose bound does not decrease is not "
+                "observable in this motion.",
+                panels,
+                evaluation.heading_spans,
+            )
+        )
+    return tuple(out)
 
 
 # Strip above charts over time: modes, and availability of each measurement source.
@@ -364,8 +315,7 @@ def strip(record: NavigationRecord, statuses: tuple[Span, ...] = ()) -> Panel | 
             fills.append(bar("outage", out, at, 0.13, VERMILLION))
         lost = _distinct(_joined([rejected_times(table) for table in tables[aid]]), whole)
         if lost.size:
-            y = np.full(lost.size, at)
-            lines.append(Line("rejected", lost, y, VERMILLION, points=True, symbol="x", size=6.0))
+            lines.append(dots("rejected", lost, np.full(lost.size, at), VERMILLION, "x", 6.0))
     if statuses:
         for status, (colour, half_height) in STATUS_LOOKS.items():
             # A status holds for a whole second, the last one beyond the end.
@@ -449,22 +399,10 @@ def span_names(modes: tuple[Span, ...], whole: Span) -> list[Line]:
     fit = [m for m in modes if (m.end - m.begin) / length > _LETTER * (len(m.name) + 2)]
     if not fit:
         return []
-    x = np.array([0.5 * (m.begin + m.end) for m in fit])
-    labels = tuple(m.name for m in fit)
-    places = ((0, 0),) * len(fit)
-    return [
-        Line(
-            "mode",
-            x,
-            np.zeros(len(fit)),
-            GREY,
-            points=True,
-            size=0.0,
-            labels=labels,
-            places=places,
-            legend=False,
-        )
-    ]
+    x = [0.5 * (m.begin + m.end) for m in fit]
+    labels, places = tuple(m.name for m in fit), ((0, 0),) * len(fit)
+    named = dots("mode", x, np.zeros(len(fit)), GREY, size=0.0, labels=labels, places=places)
+    return [replace(named, legend=False)]
 
 
 # Charts of a navigation run against its truth.
@@ -496,8 +434,7 @@ def error_charts(evaluation: NavigationEvaluation) -> tuple[Chart, ...]:
             fills = (thin_fill(BOUND, errors.time, -half, half, AXIS_COLOURS[k]),)
             panels.append(Panel(label, lines, fills=fills, height=0.8))
         caption = f"Computed − {evaluation.truth_name}, with the run's 95 % bounds."
-        drawn = tuple(panels), evaluation.record, evaluation.heading_spans
-        out.append(over_time(slug, title, caption, *drawn))
+        out.append(over_time(evaluation, slug, title, caption, panels))
     return tuple(out)
 
 
@@ -516,13 +453,12 @@ def nees_chart(evaluation: NavigationEvaluation) -> Chart | None:
         levels=(Level(low, "2.5 %"), Level(high, "97.5 %")),
     )
     return over_time(
+        evaluation,
         "nees",
         "Normalized estimation error squared (NEES)",
         f"Expected value {freedom}; at one instant 95 % of many runs lie between the "
         "levels. The errors of one run are correlated in time.",
         (panel,),
-        evaluation.record,
-        evaluation.heading_spans,
     )
 
 
@@ -554,37 +490,26 @@ def innovation_chart(
         out = np.abs(nu) > edge
         beyond += int(out.sum())
         colour = AXIS_COLOURS[k % 3]
+        # All large innovations, and the others thinned evenly in time.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            far = np.abs(nu) > _FAR * agreement.sd[:, k]
+        drawn = ~lost & ~out & (far | (np.arange(agreement.epochs) % step == 0))
         lines = [
-            *_points(
-                "used", agreement.time, nu, _some(agreement, k, ~lost & ~out), colour, "circle", 3.4
-            ),
+            *_points("used", agreement.time, nu, drawn, colour, "circle", 3.4),
             *_points("rejected", agreement.time, nu, lost & ~out, VERMILLION, "x", 6.0),
         ]
-        for up, symbol in ((True, "triangle-up"), (False, "triangle-down")):
-            some = out & ((nu > 0.0) == up)
-            at = np.full(nu.size, edge if up else -edge)
+        for sign, symbol in ((1.0, "triangle-up"), (-1.0, "triangle-down")):
+            some = out & ((nu > 0.0) == (sign > 0.0))
+            at = np.full(nu.size, sign * edge)
             lines += _points("beyond the axis", agreement.time, at, some, BLACK, symbol, 6.0)
         panels.append(Panel(label, tuple(lines), fills=(fill,), height=0.7))
     more = f" {beyond} are beyond the axis and drawn at its end." if beyond else ""
     if step > 1:
         more += f" Of those within {_FAR:g} standard deviations one in {step} is drawn."
-    return over_time(
-        f"innovations-{agreement.name.replace('.', '-').replace('_', '-')}",
-        f"Innovations of {agreement.name}",
-        f"Measured − predicted; 95 % are expected in the band.{more}",
-        tuple(panels),
-        record,
-        statuses,
-    )
-
-
-def _some(one: Agreement, k: int, which: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Select all large innovations, and the others thinned evenly in time."""
-    step = max(1, one.epochs // _POINTS)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        far = np.abs(one.nu[:, k]) > _FAR * one.sd[:, k]
-    even = np.arange(one.epochs) % step == 0
-    return np.asarray(which & (far | even))
+    slug = f"innovations-{agreement.name.replace('.', '-').replace('_', '-')}"
+    title = f"Innovations of {agreement.name}"
+    caption = f"Measured − predicted; 95 % are expected in the band.{more}"
+    return over_time(record, slug, title, caption, panels, statuses)
 
 
 #: Kinds of fix by the quality of NMEA 0183, from the best.
@@ -593,10 +518,11 @@ _FIXES = {4: "fixed", 5: "float", 3: "precise", 2: "differential", 1: "autonomou
 
 def fix_charts(evaluation: NavigationEvaluation) -> tuple[Chart, ...]:
     """Kind, satellites and stated accuracy of the fixes of each receiver; none if all constant."""
-    found = []
-    for aid, table in evaluation.run.source.tables.items():
-        if "quality" in table and len(table) > 1:
-            found.append(_fix_chart(evaluation, aid, table))
+    found = [
+        _fix_chart(evaluation, aid, table)
+        for aid, table in evaluation.run.source.tables.items()
+        if "quality" in table and len(table) > 1
+    ]
     return tuple(chart for chart in found if chart is not None)
 
 
@@ -617,9 +543,9 @@ def _fix_chart(evaluation: NavigationEvaluation, aid: str, table: pd.DataFrame) 
         for row, kind in enumerate(kinds):
             at[quality == kind] = row
         rows = kept_rows((at,), BUCKETS)
-        dots = Line("fix", time[rows], at[rows], BLUE, points=True, symbol="circle", size=3.2)
+        drawn = dots("fix", time[rows], at[rows], BLUE, "circle", 3.2)
         names = tuple(_FIXES[k] for k in kinds)
-        panels.append(Panel("", (dots,), categories=names, height=0.12 * len(names) + 0.05))
+        panels.append(Panel("", (drawn,), categories=names, height=0.12 * len(names) + 0.05))
     if "satellites" in table and np.isfinite(satellites := column("satellites")).any():
         line = curve("satellites", time, satellites, GREEN, buckets=BUCKETS)
         panels.append(Panel("satellites", (line,), height=0.6, steady=1.0))
@@ -637,13 +563,12 @@ def _fix_chart(evaluation: NavigationEvaluation, aid: str, table: pd.DataFrame) 
     if not panels:
         return None
     return over_time(
+        evaluation,
         f"fixes-{aid.replace('_', '-')}",
         f"Fixes of {aid}",
         "As the receiver states them: kind of fix, satellites used, and one standard deviation of "
         "position.",
-        tuple(panels),
-        record,
-        evaluation.heading_spans,
+        panels,
     )
 
 
@@ -660,7 +585,7 @@ def _points(
         return []
     time, value = time[some], value[some]
     rows = kept_rows((value,), BUCKETS)
-    return [Line(name, time[rows], value[rows], colour, points=True, symbol=symbol, size=size)]
+    return [dots(name, time[rows], value[rows], colour, symbol, size)]
 
 
 def nis_chart(
@@ -688,13 +613,13 @@ def nis_chart(
     if not panels:
         return None
     return over_time(
+        record,
         "nis",
         "Normalized innovations squared (NIS)",
         "95 % are expected between the levels. Line: mean of "
         f"{_WINDOW} processed epochs."
         + (" Points are thinned, except the largest." if thin else ""),
-        tuple(panels),
-        record,
+        panels,
         statuses,
     )
 

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from strapdown import __version__
 from strapdown.config.choice import ChoiceSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.evaluation.trajectory_differences import trajectory_differences
@@ -19,18 +18,19 @@ from strapdown.report.document import (
     Block,
     Document,
     Facts,
-    Items,
     KeyFigure,
     KeyFigures,
     Paragraph,
     TableBlock,
     assumed,
-    blocks,
     capital,
+    document_of,
     findings_list,
+    items_of,
     paragraph,
     run_again,
     section,
+    table_of,
 )
 from strapdown.report.navigation_evaluation import (
     FELL,
@@ -191,14 +191,12 @@ def _outages(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
     if bound < _WORSE * float(np.median(evaluation.bounds)):
         return []
     count = "one outage" if len(outages) == 1 else f"{len(outages)} outages"
-    return [
-        (
-            "In outages the position is less accurate",
-            f"{count}, {duration_words(total)} in all; the largest bound of 95{GAP}% is "
-            f"{length_words(bound)}, within {duration_words(span.end - span.begin)} without {aid} "
-            f"from {instant(span.begin)}.",
-        )
-    ]
+    text = (
+        f"{count}, {duration_words(total)} in all; the largest bound of 95{GAP}% is "
+        f"{length_words(bound)}, within {duration_words(span.end - span.begin)} without {aid} "
+        f"from {instant(span.begin)}."
+    )
+    return [("In outages the position is less accurate", text)]
 
 
 def _heading_caution(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
@@ -206,30 +204,25 @@ def _heading_caution(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
     if bound < 2.0:
         return []
     how = "is unknown" if bound >= _NO_HEADING else f"has a 95 % bound of {plain(bound, 1)}°"
-    return [
-        (
-            f"The heading {how}",
-            "without fixes the cross-track error grows by "
-            f"{plain(min(100.0, 100.0 * math.radians(min(bound, 90.0))), 1)}{GAP}% of the "
-            "distance. Acceleration and turns with fixes determine the heading, or two antennas.",
-        )
-    ]
+    text = (
+        "without fixes the cross-track error grows by "
+        f"{plain(min(100.0, 100.0 * math.radians(min(bound, 90.0))), 1)}{GAP}% of the "
+        "distance. Acceleration and turns with fixes determine the heading, or two antennas."
+    )
+    return [(f"The heading {how}", text)]
 
 
 def _memory(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
-    out = []
-    for one in evaluation.agreements:
-        if one.remembers:
-            out.append(
-                (
-                    f"Innovations of {one.name} are correlated",
-                    f"lag 1: {plain(one.correlation, 2)}; 95 % limit "
-                    f"{plain(one.correlation_bound, 2)}. Its errors are time-correlated, and the "
-                    "bounds are too small. Look for a time offset, a lever arm, "
-                    "or sensor noise that is stated too small.",
-                )
-            )
-    return out
+    return [
+        (
+            f"Innovations of {one.name} are correlated",
+            f"lag 1: {plain(one.correlation, 2)}; 95 % limit {plain(one.correlation_bound, 2)}. "
+            "Its errors are time-correlated, and the bounds are too small. Look for a time "
+            "offset, a lever arm, or sensor noise that is stated too small.",
+        )
+        for one in evaluation.agreements
+        if one.remembers
+    ]
 
 
 def _refused(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
@@ -238,9 +231,7 @@ def _refused(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
         for one in evaluation.agreements
         if one.rejected
     ]
-    if not rows:
-        return []
-    return [("Rejected", f"{', '.join(rows)}; shown as crosses.")]
+    return [("Rejected", f"{', '.join(rows)}; shown as crosses.")] if rows else []
 
 
 def _not_told(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
@@ -250,14 +241,8 @@ def _not_told(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
         some = ", ".join(evaluation.unobserved(block))
         if some:
             names.append(f"{block.name} {some}" if len(block.labels) > 1 else block.name)
-    if not names:
-        return []
-    return [
-        (
-            "Not observable in this run",
-            f"bound reduced by less than {plain(100.0 * FELL, 0)}{GAP}%: {'; '.join(names)}.",
-        )
-    ]
+    text = f"bound reduced by less than {plain(100.0 * FELL, 0)}{GAP}%: {'; '.join(names)}."
+    return [("Not observable in this run", text)] if names else []
 
 
 def _heading(evaluation: NavigationEvaluation) -> str:
@@ -295,29 +280,21 @@ def smoothing_chart(evaluation: NavigationEvaluation) -> Chart | None:
     ):
         if column in record.not_estimated:
             continue
-        lines = tuple(
-            curve(
-                name,
-                one.sd.index.to_numpy(),
-                _bound(one, column),
-                colour,
-                width=width,
-                buckets=BUCKETS,
-            )
-            for name, one, colour, width in (
-                ("filter", forward, GREY, 1.2),
-                ("smoothed", record, BLUE, 1.6),
-            )
-        )
-        panels.append(Panel(label, lines, log=True))
+        lines = []
+        for name, one, colour, width in (
+            ("filter", forward, GREY, 1.2),
+            ("smoothed", record, BLUE, 1.6),
+        ):
+            time, bound = one.sd.index.to_numpy(), _bound(one, column)
+            lines.append(curve(name, time, bound, colour, width=width, buckets=BUCKETS))
+        panels.append(Panel(label, tuple(lines), log=True))
     return over_time(
+        evaluation,
         "smoothing",
         "Filter and smoother",
         "95 % bounds: of the filter, from the measurements up to each instant; smoothed, from all "
         "measurements.",
-        tuple(panels),
-        record,
-        evaluation.heading_spans,
+        panels,
     )
 
 
@@ -346,19 +323,18 @@ def separation_chart(evaluation: NavigationEvaluation) -> Chart | None:
         fill = thin_fill("95 % expected", marks[kept], -reach, reach, GREY, opacity=0.25)
         panels.append(Panel(f"{column}, m", (line,), fills=(fill,), height=0.8))
     return over_time(
+        evaluation,
         "separation",
         "Separation of filter and smoother",
         "Filter − smoothed position. The separation exceeds its band where later measurements "
         "contradict the filter by more than it states.",
-        tuple(panels),
-        record,
-        evaluation.heading_spans,
+        panels,
     )
 
 
 def smoothing_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """Median bounds and errors against the truth, filter and smoother."""
-    forward, agreement = evaluation.run.forward, evaluation.smoother
+    forward, agreement, errors = evaluation.run.forward, evaluation.smoother, evaluation.errors
     if forward is None or agreement is None:
         return None
     rows = []
@@ -366,42 +342,28 @@ def smoothing_table(evaluation: NavigationEvaluation) -> TableBlock | None:
         before, after = (
             float(np.median(_bound(one, column))) for one in (forward, evaluation.record)
         )
+        share = share_words(float(agreement.share[k])) if agreement.instants[k] else "–"
+        known = () if errors is None else (evaluation.forward_errors, errors)
         rows.append(
             (
                 f"{column}, {UNITS[column]}",
                 _figure(before),
                 _figure(after),
                 plain(before / after, 1) if after > 0.0 else "–",
-                *_errors(evaluation, column),
-                NOT_ESTIMATED
-                if column in evaluation.record.not_estimated
-                else share_words(float(agreement.share[k]))
-                if agreement.instants[k]
-                else "–",
+                *(_figure(one.score(column).rms) for one in known if one is not None),
+                NOT_ESTIMATED if column in evaluation.record.not_estimated else share,
             )
         )
-    return TableBlock(
-        (
-            *("", "filter", "smoothed", "ratio"),
-            *(() if evaluation.errors is None else ("error of filter", "smoothed")),
-            "consistent",
-        ),
-        tuple(rows),
-        text=(0,),
-        caption="95 % bounds, medians over the run"
-        + ("" if evaluation.errors is None else "; RMS errors against the truth")
+    return table_of(
+        "| filter | smoothed | ratio |"
+        + ("" if errors is None else "error of filter | smoothed |")
+        + "consistent",
+        rows,
+        "95 % bounds, medians over the run"
+        + ("" if errors is None else "; RMS errors against the truth")
         + ". Consistent: share of the differences within three standard deviations by both "
         "covariances (99.7 % for a correct model).",
-        strong=tuple(k for k in range(len(rows)) if _apart(agreement, k)),
-    )
-
-
-def _errors(evaluation: NavigationEvaluation, column: str) -> tuple[str, ...]:
-    """RMS errors of filter and smoother, if the truth is known."""
-    if evaluation.errors is None or evaluation.forward_errors is None:
-        return ()
-    return tuple(
-        _figure(one.score(column).rms) for one in (evaluation.forward_errors, evaluation.errors)
+        strong=(k for k in range(len(rows)) if _apart(agreement, k)),
     )
 
 
@@ -430,16 +392,14 @@ def agreement_words(evaluation: NavigationEvaluation) -> tuple[tuple[str, str], 
     if not apart:
         return ()
     worst = min(apart, key=lambda k: agreement.share[k])
-    named = ", ".join(agreement.columns[k] for k in apart)
-    return (
-        (
-            "Filter and smoother are inconsistent",
-            f"in {named}: {share_words(agreement.share[worst])} of the differences of "
-            f"{agreement.columns[worst]} are within three standard deviations. Later measurements "
-            "contradict the model: look for time-correlated sensor errors that are not stated "
-            "([sensors], [states.NAME]).",
-        ),
+    text = (
+        f"in {', '.join(agreement.columns[k] for k in apart)}: "
+        f"{share_words(agreement.share[worst])} of the differences of "
+        f"{agreement.columns[worst]} are within three standard deviations. Later measurements "
+        "contradict the model: look for time-correlated sensor errors that are not stated "
+        "([sensors], [states.NAME])."
     )
+    return (("Filter and smoother are inconsistent", text),)
 
 
 def _apart(agreement: SmootherConsistency, k: int) -> bool:
@@ -470,15 +430,12 @@ def end_table(evaluation: NavigationEvaluation) -> TableBlock:
     record = evaluation.record
     rows = [
         ("time", *(instant(float(record.trajectory.index[k])) for k in (0, -1))),
-        ("position", position_words(evaluation, 0), position_words(evaluation, -1)),
+        ("position", *(position_words(evaluation, k) for k in (0, -1))),
+        ("horizontal ±", *(length_words(float(evaluation.bounds[k])) for k in (0, -1))),
     ]
-    rows.append(("horizontal ±", *(length_words(float(evaluation.bounds[k])) for k in (0, -1))))
     for name, column, sd, unit in (
         ("height", "alt", "down", "m"),
-        *(
-            (f"velocity {w}", v, v, "m/s")
-            for v, w in zip(VELOCITY, ("north", "east", "down"), strict=True)
-        ),
+        *((f"velocity {w}", v, v, "m/s") for v, w in zip(VELOCITY, NED, strict=True)),
         *((a, a, a, "°") for a in reversed(EULER)),
     ):
         cells = []
@@ -487,9 +444,8 @@ def end_table(evaluation: NavigationEvaluation) -> TableBlock:
             value = heading_shown(value, half(its_sd)) if column == "heading" else value
             cells.append(_stated(value, its_sd, unit))
         rows.append((name, *cells))
-    return TableBlock(
-        ("", "start", "end"), tuple(rows), text=(0,), caption="Start and end, with 95 % bounds."
-    )
+    caption = "Start and end, with 95 % bounds."
+    return TableBlock(("", "start", "end"), tuple(rows), caption=caption)
 
 
 def _stated(value: float, sd: float, unit: str) -> str:
@@ -502,27 +458,23 @@ def _stated(value: float, sd: float, unit: str) -> str:
 def state_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """Sensor and measurement errors: uncertainty before and after the run."""
     record = evaluation.run.filtered
-    if record.sensors.empty or not len(record.sensors.columns):
-        return None
     rows = []
-    for block in evaluation.states:
+    for block in () if record.sensors.empty else evaluation.states:
         for column, label in zip(block.columns, block.labels, strict=True):
             value = block.factor * float(record.sensors[column].iloc[-1])
             first, last = (block.factor * half(record.sensors_sd[column].iloc[k]) for k in (0, -1))
-            name = f"{block.name} {label}" if len(block.columns) > 1 else block.name
             rows.append(
                 (
-                    name,
+                    f"{block.name} {label}" if len(block.columns) > 1 else block.name,
                     about(value, last, block.unit),
                     plus_minus(first, block.unit),
                     share_words(1.0 - last / first) if first > 0.0 and last <= first else "–",
                 )
             )
-    return TableBlock(
-        ("state", "final estimate", "initial bound", "bound reduced by"),
-        tuple(rows),
-        text=(0,),
-        caption="Estimated sensor and measurement errors, with 95 % bounds.",
+    return table_of(
+        "state | final estimate | initial bound | bound reduced by",
+        rows,
+        "Estimated sensor and measurement errors, with 95 % bounds.",
     )
 
 
@@ -530,40 +482,18 @@ def observation_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """Observations with their innovation statistics and rejected epochs."""
     rows = []
     for one in evaluation.agreements:
-        band = "–"
+        band = memory = "–"
         if one.used.any():
             band = f"{plain(one.band[0], 2)} to {plain(one.band[1], 2)}"
-        memory = "–"
         if math.isfinite(one.correlation):
             memory = f"{plain(one.correlation, 2)} (±{GAP}{plain(one.correlation_bound, 2)})"
-        rows.append(
-            (
-                one.name,
-                str(one.epochs),
-                str(one.rejected),
-                str(one.weakened),
-                plain(one.ratio, 2),
-                plain(one.mean_nis, 2),
-                band,
-                memory,
-            )
-        )
-    if not rows:
-        return None
-    return TableBlock(
-        (
-            "measurement",
-            "epochs",
-            "rejected",
-            "weakened",
-            "rms, sd",
-            "mean NIS",
-            "expected, 95 %",
-            "correlation",
-        ),
-        tuple(rows),
-        text=(0,),
-        caption="Processed innovations: RMS in predicted standard deviations, mean normalized "
+        counts = map(str, (one.epochs, one.rejected, one.weakened))
+        rows.append((one.name, *counts, plain(one.ratio, 2), plain(one.mean_nis, 2), band, memory))
+    return table_of(
+        "measurement | epochs | rejected | weakened | rms, sd | mean NIS | expected, 95 % "
+        "| correlation",
+        rows,
+        "Processed innovations: RMS in predicted standard deviations, mean normalized "
         "innovation squared (NIS) with its 95 % interval, and the largest lag-1 autocorrelation "
         "of a component with its 95 % limit.",
     )
@@ -571,28 +501,20 @@ def observation_table(evaluation: NavigationEvaluation) -> TableBlock | None:
 
 def outage_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """Outages, each with its largest bound."""
-    rows = [
+    return table_of(
+        "measurement | from | for | largest bound",
         (
-            aid,
-            instant(span.begin),
-            duration_words(span.end - span.begin),
-            length_words(bound),
-        )
-        for aid, span, bound in longest_outages(evaluation)
-    ]
-    if not rows:
-        return None
-    return TableBlock(
-        ("measurement", "from", "for", "largest bound"),
-        tuple(rows),
-        text=(0,),
-        caption="Outages, with the largest horizontal 95 % bound in each.",
+            (aid, instant(s.begin), duration_words(s.end - s.begin), length_words(bound))
+            for aid, s, bound in longest_outages(evaluation)
+        ),
+        "Outages, with the largest horizontal 95 % bound in each.",
     )
 
 
 def withheld_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """GNSS outage tests with the resulting errors."""
-    verdicts = [judge_outages([w.result]) for w in evaluation.run.withheld]
+    tests = evaluation.run.withheld
+    verdicts = [judge_outages([w.result]) for w in tests]
     rows = [
         (
             withheld_aid(evaluation.run.spec),
@@ -604,25 +526,20 @@ def withheld_table(evaluation: NavigationEvaluation) -> TableBlock | None:
             "yes" if verdict.consistent else "no",
             *(() if w.smoothed is None else (length_words(w.forward.largest),)),
         )
-        for w, verdict in zip(evaluation.run.withheld, verdicts, strict=True)
+        for w, verdict in zip(tests, verdicts, strict=True)
     ]
-    if not rows:
-        return None
     smoothed = evaluation.run.forward is not None
-    return TableBlock(
-        (
-            *("GNSS outage test", "from", "for", "largest error", "95 % bound", "within bounds"),
-            "consistent",
-            *(("filter alone",) if smoothed else ()),
-        ),
-        tuple(rows),
-        text=(0, 6),
-        caption="Measurements withheld on purpose: the largest horizontal error, the run's "
-        "95 % bound at that instant, and the share of the "
-        + ("true positions" if evaluation.run.withheld[0].result.against == "truth" else "fixes")
-        + " within their bounds; consistent unless such a share or error is less probable than 1 %"
+    known = "true positions" if tests and tests[0].result.against == "truth" else "fixes"
+    return table_of(
+        "GNSS outage test | from | for | largest error | 95 % bound | within bounds | consistent"
+        + (" | filter alone" if smoothed else ""),
+        rows,
+        "Measurements withheld on purpose: the largest horizontal error, the run's 95 % bound at "
+        f"that instant, and the share of the {known} within their bounds; consistent unless such "
+        "a share or error is less probable than 1 %"
         + ("; smoothed, and by the filter alone." if smoothed else "."),
-        strong=tuple(k for k, verdict in enumerate(verdicts) if not verdict.consistent),
+        text=(0, 6),
+        strong=(k for k, verdict in enumerate(verdicts) if not verdict.consistent),
     )
 
 
@@ -633,17 +550,14 @@ def point_table(evaluation: NavigationEvaluation) -> TableBlock | None:
         return None
     row = (
         f"{len(score.time)} of {score.given}",
-        length_words(score.way),
-        length_words(score.rms),
-        length_words(score.median),
-        length_words(score.largest),
+        *map(length_words, (score.way, score.rms, score.median, score.largest)),
         instant(score.largest_at),
         f"{plain(100.0 * score.rms / score.way, 2)} %",
     )
-    return TableBlock(
-        ("control points", "path length", "rms", "median", "largest", "at", "rms / path length"),
+    return table_of(
+        "control points | path length | rms | median | largest | at | rms / path length",
         (row,),
-        caption="Horizontal distance from the control points, after a fit of origin and heading "
+        "Horizontal distance from the control points, after a fit of origin and heading "
         f"(no scale): the run's heading minus theirs is {plain(score.turn_deg, 2)} deg.",
     )
 
@@ -653,7 +567,7 @@ def error_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     if evaluation.errors is None:
         return None
     names = {"horizontal": "horizontal", "down": "down (height)"}
-    names |= {v: f"velocity {w}" for v, w in zip(VELOCITY, ("north", "east", "down"), strict=True)}
+    names |= {v: f"velocity {w}" for v, w in zip(VELOCITY, NED, strict=True)}
     rows = []
     for score in evaluation.errors.scores:
         places = decimals(score.rms) if score.rms > 0.0 else 3
@@ -667,12 +581,10 @@ def error_table(evaluation: NavigationEvaluation) -> TableBlock | None:
                 share_words(score.share),
             )
         )
-    return TableBlock(
-        ("error", "rms", "largest", "at", "95 % bound, rms", "within bound"),
-        tuple(rows),
-        text=(0,),
-        caption=f"Errors against {evaluation.truth_name}, at "
-        f"{len(evaluation.errors.time)} instants.",
+    return table_of(
+        "error | rms | largest | at | 95 % bound, rms | within bound",
+        rows,
+        f"Errors against {evaluation.truth_name}, at {len(evaluation.errors.time)} instants.",
         strong=(0,),
     )
 
@@ -680,16 +592,13 @@ def error_table(evaluation: NavigationEvaluation) -> TableBlock | None:
 def event_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """Events; only the first ones if there are many."""
     events = evaluation.record.events
-    if not events:
-        return None
-    shown = events[:_MOST_EVENTS]
-    rest = len(events) - len(shown)
-    more = f"; {rest} more are in navigation.json" if rest else ""
-    return TableBlock(
-        ("at", "event", "description"),
-        tuple((instant(e.time), e.kind, e.finding.what) for e in shown),
+    rest = len(events) - _MOST_EVENTS
+    more = f"; {rest} more are in navigation.json" if rest > 0 else ""
+    return table_of(
+        "at | event | description",
+        ((instant(e.time), e.kind, e.finding.what) for e in events[:_MOST_EVENTS]),
+        f"Events in order of time{more}.",
         text=(0, 1, 2),
-        caption=f"Events in order of time{more}.",
     )
 
 
@@ -697,20 +606,13 @@ def event_table(evaluation: NavigationEvaluation) -> TableBlock | None:
 
 
 def navigation_document(evaluation: NavigationEvaluation, name: str) -> Document:
-    """Return the report of a navigation run.
-
-    Parameters
-    ----------
-    name : str
-        Folder name, for the verification command; no command if empty.
-    """
+    """Return the report of a run; `name`: of its folder, to verify it; no command if empty."""
     from strapdown.report import navigation_charts as charts
     from strapdown.report.navigation_plan import plan_chart
 
     run = evaluation.run
     verdict = trust(evaluation)
     plan = plan_chart(evaluation)
-    said = cautions(evaluation)
     aids = dict.fromkeys(
         [*evaluation.record.outages, *(a.name.partition(".")[0] for a in evaluation.agreements)]
     )
@@ -793,25 +695,25 @@ def navigation_document(evaluation: NavigationEvaluation, name: str) -> Document
         section("conventions", "Conventions", Facts(conventions(run)), folded=True),
     )
     title = run.spec.title or f"Navigation of {run.source.name}"
-    return Document(
+    start = position_words(evaluation, 0)
+    return document_of(
         title,
         headline(evaluation),
         (
             ("Record", f"{run.source.name}, {run.source.what}"),
-            ("Start", position_words(evaluation, 0)),
+            ("Start", start),
             ("Measurements", ", ".join(aids) or "none"),
-            ("Software", f"strapdown {__version__}"),
         ),
-        blocks(
+        (
             KeyFigures(key_figures(evaluation)),
             verdict.paragraph,
-            Items(said) if said else None,
-            Paragraph(f"Stationary at {position_words(evaluation, 0)}.") if plan is None else None,
+            items_of(cautions(evaluation)),
+            Paragraph(f"Stationary at {start}.") if plan is None else None,
             plan,
             charts.bound_chart(evaluation),
         ),
         sections,
-        title,
+        footer=title,
     )
 
 
@@ -861,7 +763,7 @@ def _observations(evaluation: NavigationEvaluation) -> tuple[Block | None, ...]:
     return (
         observation_table(evaluation),
         Paragraph(against if rows else agree),
-        Items(tuple(rows)) if rows else None,
+        items_of(rows),
         nis_chart(evaluation.record, evaluation.agreements, evaluation.heading_spans),
     )
 
@@ -871,10 +773,9 @@ def _observations(evaluation: NavigationEvaluation) -> tuple[Block | None, ...]:
 
 def conventions(run: NavigationRun) -> tuple[tuple[str, str], ...]:
     """Return axes, signs and levels of what a run states."""
-    height = height_words(as_stated=run.source.heights_as_stated)
     position = (
         "of the inertial sensors: geodetic latitude north and longitude east in deg, height "
-        f"{height}, in m"
+        f"{height_words(as_stated=run.source.heights_as_stated)}, in m"
     )
     return (
         ("Body axes", "forward, right, down; local level: north, east, down"),

@@ -275,10 +275,7 @@ class Agreement:
 def agreements(record: NavigationRecord, lasting: Collection[str] = ()) -> tuple[Agreement, ...]:
     """Return the consistency of each observation that has innovations.
 
-    Parameters
-    ----------
-    lasting : collection of str
-        Names of the measurement sources with stated time-correlated errors.
+    `lasting`: names of the measurement sources with stated time-correlated errors.
     """
     return tuple(
         _agreement(name, table, (name.rpartition(".")[0] or name) in lasting)
@@ -459,16 +456,9 @@ def blocks_of(record: NavigationRecord) -> tuple[ShownStates, ...]:
         factor, unit = shown_unit(record.units.get(columns[0], ""), size)
         aid, dot, own = name.rpartition(".")
         words = own.replace("_", " ")
-        out.append(
-            ShownStates(
-                f"{aid}: {words}" if dot else words.replace("accel ", "accelerometer "),
-                name.replace("_", "-").replace(".", "-"),
-                tuple(columns),
-                tuple(labels),
-                unit,
-                factor,
-            )
-        )
+        words = f"{aid}: {words}" if dot else words.replace("accel ", "accelerometer ")
+        slug = name.replace("_", "-").replace(".", "-")
+        out.append(ShownStates(words, slug, tuple(columns), tuple(labels), unit, factor))
     return tuple(out)
 
 
@@ -508,17 +498,12 @@ def trust(evaluation: NavigationEvaluation) -> Trust:
     known = _against_known(evaluation)
     used = [one for one in evaluation.agreements if one.used.any()]
     reasons = known + [_innovations(one) for one in used]
-    reasons += [
-        reason(
-            False,
-            "navigation.innovations-correlated",
-            name=one.name,
-            correlation=one.correlation,
-            by_chance=one.correlation_bound,
-        )
-        for one in evaluation.agreements
-        if one.remembers
-    ]
+    for one in evaluation.agreements:
+        if one.remembers:
+            chance = {"correlation": one.correlation, "by_chance": one.correlation_bound}
+            reasons.append(
+                reason(False, "navigation.innovations-correlated", name=one.name, **chance)
+            )
     reasons += _rejected(evaluation)
     # Notes appear among the findings and do not count against the run.
     reasons += [f for f in evaluation.run.findings if f.severity == "warning"]
@@ -534,34 +519,18 @@ def trust(evaluation: NavigationEvaluation) -> Trust:
 def _short(evaluation: NavigationEvaluation) -> tuple[Finding, ...]:
     parts = []
     if evaluation.errors is not None:
-        score = evaluation.errors.score("horizontal")
-        parts.append(
-            reason(
-                True,
-                "navigation.position-within-bound",
-                reference=evaluation.truth_name,
-                share=score.share,
-            )
-        )
-    if count := len(evaluation.run.withheld):
-        parts.append(
-            reason(True, "navigation.outage-test-passed")
-            if count == 1
-            else reason(True, "navigation.outage-tests-passed", count=count)
-        )
-    used = [one for one in evaluation.agreements if one.used.any()]
-    if used:
+        share, name = evaluation.errors.score("horizontal").share, evaluation.truth_name
+        code = "navigation.position-within-bound"
+        parts.append(reason(True, code, reference=name, share=share))
+    if (count := len(evaluation.run.withheld)) == 1:
+        parts.append(reason(True, "navigation.outage-test-passed"))
+    elif count:
+        parts.append(reason(True, "navigation.outage-tests-passed", count=count))
+    if used := [one for one in evaluation.agreements if one.used.any()]:
         worst = max(used, key=lambda a: abs(a.ratio - 1.0))
-        parts.append(
-            reason(
-                True,
-                "navigation.innovations-as-expected"
-                if len(used) == 1
-                else "navigation.innovations-as-expected-worst",
-                name=worst.name,
-                ratio=worst.ratio,
-            )
-        )
+        code = "navigation.innovations-as-expected-worst"
+        code = "navigation.innovations-as-expected" if len(used) == 1 else code
+        parts.append(reason(True, code, name=worst.name, ratio=worst.ratio))
     return tuple(parts)
 
 
@@ -574,30 +543,22 @@ def _against_known(evaluation: NavigationEvaluation) -> list[Finding]:
     known = [one for one in scores if not np.isnan(one.share)]
     for score in known:
         lasting = score.share < _ENOUGH and score.chance >= _RARE / len(known)
-        out.append(
-            reason(
-                bool(score.share >= _ENOUGH or lasting),
-                "navigation.error-beside-bound-lasting"
-                if lasting
-                else "navigation.error-beside-bound",
-                component=words.get(score.quantity, score.quantity),
-                rms=score.rms,
-                bound=score.bound,
-                unit=score.unit,
-                share=score.share,
-                chance=score.chance,
-            )
-        )
+        code = "navigation.error-beside-bound"
+        good = bool(score.share >= _ENOUGH or lasting)
+        component = words.get(score.quantity, score.quantity)
+        keys = ("rms", "bound", "unit", "share", "chance")
+        data = {key: getattr(score, key) for key in keys}
+        code = "navigation.error-beside-bound-lasting" if lasting else code
+        out.append(reason(good, code, component=component, **data))
     tests = [one.result for one in evaluation.run.withheld]
     if tests:
         verdict = judge_outages(tests)
         worst = tests[verdict.worst]
+        code = "navigation.outage-tests"
         out.append(
             reason(
                 verdict.consistent,
-                "navigation.outage-tests"
-                if worst.against == "fixes"
-                else "navigation.outage-tests-truth",
+                code if worst.against == "fixes" else "navigation.outage-tests-truth",
                 inside=verdict.inside,
                 instants=verdict.count,
                 count=len(tests),
@@ -611,21 +572,18 @@ def _against_known(evaluation: NavigationEvaluation) -> list[Finding]:
 
 
 def _innovations(one: Agreement) -> Finding:
-    good = one.inside or one.acceptable
+    larger = one.ratio > 1.0
     if one.inside:
         code = "navigation.innovations-agree"
     elif one.acceptable and one.ratio <= 1.0 / FAR_OFF:
         code = "navigation.innovations-small-but-correlated"
+    elif one.acceptable and larger:
+        code = "navigation.innovations-a-little-larger"
     elif one.acceptable:
-        code = (
-            "navigation.innovations-a-little-larger"
-            if one.ratio > 1.0
-            else "navigation.innovations-a-little-smaller"
-        )
+        code = "navigation.innovations-a-little-smaller"
     else:
-        code = (
-            "navigation.innovations-larger" if one.ratio > 1.0 else "navigation.innovations-smaller"
-        )
+        code = "navigation.innovations-larger" if larger else "navigation.innovations-smaller"
+    good = one.inside or one.acceptable
     return reason(good, code, name=one.name, ratio=one.ratio, independent=one.lasting)
 
 

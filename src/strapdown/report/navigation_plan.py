@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -27,6 +27,7 @@ from strapdown.report.chart import (
     Line,
     Panel,
     Picture,
+    dots,
 )
 from strapdown.report.chart_svg import plane_view
 from strapdown.report.navigation_charts import TIME, mode_colour
@@ -101,21 +102,9 @@ def _drawn(evaluation: NavigationEvaluation) -> tuple[Chart, Plane] | None:
         said,
         beyond,
     ]
-    chart = Chart(
-        "plan",
-        "Path",
-        " ".join(w for w in words if w),
-        TIME,
-        (
-            Panel(
-                f"north of the start, {plane.unit}",
-                tuple(lines),
-                x_label=f"east of the start, {plane.unit}",
-                height=view.height,
-            ),
-        ),
-    )
-    return chart, plane
+    east, north = (f"{side} of the start, {plane.unit}" for side in ("east", "north"))
+    panel = Panel(north, tuple(lines), x_label=east, height=view.height)
+    return Chart("plan", "Path", " ".join(filter(None, words)), TIME, (panel,)), plane
 
 
 def plan_tiles(evaluation: NavigationEvaluation, opened: MapFile) -> list[Tile]:
@@ -218,8 +207,7 @@ def _fixes(plane: Plane, view: PlanView) -> tuple[list[Line], str]:
             ("rejected", gone, VERMILLION, "x", 6.0),
         ):
             if rows.size or name != "rejected":
-                at = east[rows], north[rows]
-                out.append(Line(name, *at, colour, points=True, symbol=symbol, size=size))
+                out.append(dots(name, east[rows], north[rows], colour, symbol, size))
     if not beyond:
         return out, ""
     return out, f"{beyond} {'fix is' if beyond == 1 else 'fixes are'} outside of the plan."
@@ -243,28 +231,24 @@ def _points(plane: Plane) -> list[Line]:
     if score is None:
         return []
     placed, there = plane.scale * score.points, plane.scale * (score.points + score.error)
-    drawn: dict[str, Any] = {"points": True, "symbol": "circle", "size": 5.0, "hollow": True}
     gap = np.full(len(placed), np.nan)
     x = np.column_stack([placed[:, 1], there[:, 1], gap]).reshape(-1)[:-1]
     y = np.column_stack([placed[:, 0], there[:, 0], gap]).reshape(-1)[:-1]
     east, north = placed[:, 1], placed[:, 0]
     return [
         Line("error at a control point", x, y, VERMILLION, width=1.2),
-        Line("control points", east, north, BLACK, **drawn),
+        dots("control points", east, north, BLACK, "circle", 5.0, hollow=True),
     ]
 
 
 def _scale(view: PlanView, path: tuple[Array, Array], unit: str) -> list[Line]:
     """Scale bar of round length and north arrow, in the emptiest corner."""
     size = view.high - view.low
-    best, fewest = view.low, math.inf
-    for x_side in (0, 1):
-        for y_side in (0, 1):
-            corner = view.low + size * np.array([x_side, y_side])
-            near = np.abs(np.column_stack(path) - corner) < _CORNER * size[0]
-            count = float(near.all(axis=1).sum())
-            if count < fewest:
-                best, fewest = np.array([x_side, y_side], dtype=np.float64), count
+    counts = {}
+    for side in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        near = np.abs(np.column_stack(path) - view.low - size * side) < _CORNER * size[0]
+        counts[side] = int(near.all(axis=1).sum())
+    best = min(counts, key=lambda side: counts[side])
     length = nice_step(0.5 * _BAR * view.width)
     up = _ARROW * view.width
     inset = 0.01 * view.width
@@ -276,21 +260,12 @@ def _scale(view: PlanView, path: tuple[Array, Array], unit: str) -> list[Line]:
     x, foot = left + 0.5 * length, low + 1.15 * up
     arrow_x = x + up * np.array([0.0, 0.0, -0.18, 0.0, 0.18])
     arrow_y = foot + up * np.array([0.0, 0.8, 0.5, 0.8, 0.5])
-    words = f"{length:g}{GAP}{unit}"
+    words, places = (f"{length:g}{GAP}{unit}", "N"), ((0, 1), (0, 1))
+    named = dots("scale", [x, x], [low, foot + 0.8 * up], BLACK, size=0.0, labels=words)
     return [
         Line("scale", bar_x, bar_y, BLACK, width=1.8, legend=False),
         Line("north", arrow_x, arrow_y, BLACK, width=1.6, legend=False),
-        Line(
-            "scale",
-            np.array([x, x]),
-            np.array([low, foot + 0.8 * up]),
-            BLACK,
-            points=True,
-            size=0.0,
-            labels=(words, "N"),
-            places=((0, 1), (0, 1)),
-            legend=False,
-        ),
+        replace(named, places=places, legend=False),
     ]
 
 
@@ -387,12 +362,10 @@ def ellipse_rows(evaluation: NavigationEvaluation) -> tuple[list[int], list[tupl
             ends.append((int(inside[-1]), span))
     ends = sorted(sorted(ends, key=lambda e: -bounds[e[0]])[:_AT_OUTAGES])
     spans = [s for v in record.outages.values() for s in v]
-    free = (
-        ~np.any([within_span(time, s) for s in spans], axis=0)
-        if spans
-        else np.ones(time.size, bool)
-    )
-    rows = np.flatnonzero(free)
+    lost = np.zeros(time.size, dtype=bool)
+    for span in spans:
+        lost |= within_span(time, span)
+    rows = np.flatnonzero(~lost)
     if not rows.size:
         return [], ends
     table = record.trajectory
@@ -421,7 +394,11 @@ def ellipses(plane: Plane, view: PlanView) -> tuple[list[Line], str, list[tuple[
     bounds = plane.found.bounds[rows] * plane.scale
     if not rows or not bounds.max() > 0.0:
         return [], "", []
-    factor = max(1.0, _round_down(_LARGEST * view.width / float(bounds.max())))
+    # The largest of 1, 2, 5 times a power of ten with which none is too large.
+    most = _LARGEST * view.width / float(bounds.max())
+    power = 10.0 ** math.floor(math.log10(most))
+    rounded = next(f * power for f in (5.0, 2.0, 1.0) if f * power <= most * (1.0 + 1e-9))
+    factor = max(1.0, rounded)
     middles = centres(plane, rows)
     out = []
     count = len(along)
@@ -454,12 +431,6 @@ def centres(plane: Plane, rows: list[int]) -> Array:
     return np.column_stack(plane.of(near))
 
 
-def _round_down(value: float) -> float:
-    """Largest of 1, 2, 5 times a power of ten that is not above a number."""
-    power = 10.0 ** math.floor(math.log10(value))
-    return next(f * power for f in (5.0, 2.0, 1.0) if f * power <= value * (1.0 + 1e-9))
-
-
 def bound_labels(
     plane: Plane,
     view: PlanView,
@@ -467,16 +438,9 @@ def bound_labels(
     marks: list[Line],
     ends: list[tuple[int, Span]],
 ) -> list[Line]:
-    """Return labels of the bound reached at the end of each outage.
+    """Return labels of the bound reached at the end of each outage, `ends` from `ellipses`.
 
-    Parameters
-    ----------
-    path : tuple of ndarray, (n,)
-        East and north, which labels avoid.
-    marks : list of Line
-        Marks whose labels are avoided, too.
-    ends : list of (int, Span)
-        From `ellipses`.
+    They avoid `path`, east and north, (n,), and the labels of `marks`.
     """
     if not ends:
         return []
@@ -487,21 +451,10 @@ def bound_labels(
     )
     taken = [_text(m, view) for m in marks if m.labels]
     obstacles = np.vstack([view.corners, np.column_stack(path)[:: max(1, path[0].size // 150)]])
-    places = place_labels(points[:, 0], points[:, 1], words, np.vstack([obstacles, *taken]))
-    return [
-        Line(
-            "bound",
-            points[:, 0],
-            points[:, 1],
-            VERMILLION,
-            points=True,
-            symbol="circle",
-            size=3.0,
-            labels=words,
-            places=places,
-            legend=False,
-        )
-    ]
+    east, north = points.T
+    places = place_labels(east, north, words, np.vstack([obstacles, *taken]))
+    named = dots("bound", east, north, VERMILLION, "circle", 3.0, labels=words, places=places)
+    return [replace(named, legend=False)]
 
 
 def _text(mark: Line, view: PlanView) -> Array:

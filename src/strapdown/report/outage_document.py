@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from strapdown import __version__
 from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
 from strapdown.navigation.outage import Share
 from strapdown.report.chart import (
@@ -17,12 +16,12 @@ from strapdown.report.chart import (
     GREY,
     SERIES_COLOURS,
     VERMILLION,
-    Array,
     Bars,
     Chart,
     Fill,
     Line,
     Panel,
+    dots,
 )
 from strapdown.report.document import (
     Document,
@@ -32,10 +31,11 @@ from strapdown.report.document import (
     Paragraph,
     TableBlock,
     assumed,
-    blocks,
+    document_of,
     paragraph,
     run_again,
     section,
+    table_of,
 )
 from strapdown.report.plan import ellipse
 from strapdown.report.values import (
@@ -229,16 +229,15 @@ def headline(result: OutageRun) -> str:
 
 def remedy(result: OutageRun) -> str:
     """Return the largest contributor to the drift, and its remedy."""
-    found = result.forecast
-    whole = float(found.variance("horizontal")[-1])
-    first = found.shares[0]
-    share = first.variance["horizontal"][-1] / whole
-    if found.aids and float(found.aids["horizontal"][-1]) / whole > share:
-        share = float(found.aids["horizontal"][-1]) / whole
+    parts = _parts(result)
+    (_, share, first), (_, last, source) = parts[0], parts[-1]
+    if source is None and last > share:
+        share = last
         return (
             f"The largest share, {share_words(share)} of the variance, is {aids_name}: they limit "
             "the drift."
         )
+    assert first is not None
     words = _REMEDIES.get(first.source.name, "a more accurate value would help")
     return (
         f"The largest share, {share_words(float(share))} of the variance, is "
@@ -277,30 +276,24 @@ def inside_words(result: OutageRun) -> str:
 def key_figures(result: OutageRun) -> tuple[KeyFigure, ...]:
     """Return the key figures."""
     said = "95 % at the end"
-    variances = result.cone[2]
-
-    def sd(quantity: str) -> float:
-        return math.sqrt(max(float(variances[quantity][-1]), 0.0))
-
+    # Half widths, in SI.
+    along, across, up, heading = (
+        half(math.sqrt(max(float(result.cone[2][quantity][-1]), 0.0)))
+        for quantity in ("along", "across", "vertical", "heading")
+    )
     figures = [
         KeyFigure("Horizontal", length_words(end_bound(result)), said),
-        KeyFigure("Along track", f"±{GAP}{length_words(half(sd('along')))}", said),
-        KeyFigure("Cross track", f"±{GAP}{length_words(half(sd('across')))}", said),
+        KeyFigure("Along track", f"±{GAP}{length_words(along)}", said),
+        KeyFigure("Cross track", f"±{GAP}{length_words(across)}", said),
         KeyFigure("Vertical", NOT_ESTIMATED, "the error model has no height")
-        if math.isnan(sd("vertical"))
-        else KeyFigure("Vertical", f"±{GAP}{length_words(half(sd('vertical')))}", said),
-        KeyFigure("Heading", f"±{GAP}{three_digits(math.degrees(half(sd('heading'))))}°", said),
+        if math.isnan(up)
+        else KeyFigure("Vertical", f"±{GAP}{length_words(up)}", said),
+        KeyFigure("Heading", f"±{GAP}{three_digits(math.degrees(heading))}°", said),
     ]
-    drifts = drifts_of(result.equal)
-    if drifts:
+    if drifts := drifts_of(result.equal):
         fixes = np.concatenate([d.inside for d in drifts])
-        figures.append(
-            KeyFigure(
-                "Within 95 % bounds",
-                share_words(float(fixes.mean())),
-                f"of {len(fixes)} fixes in {len(drifts)} outages",
-            )
-        )
+        of = f"of {len(fixes)} fixes in {len(drifts)} outages"
+        figures.append(KeyFigure("Within 95 % bounds", share_words(float(fixes.mean())), of))
     return tuple(figures)
 
 
@@ -324,7 +317,7 @@ def outage_document(result: OutageRun, name: str) -> Document:
         ),
     )
     title = f"Drift of {result.name} over an outage of {outage_words(result)}"
-    return Document(
+    return document_of(
         title,
         headline(result),
         (
@@ -332,16 +325,15 @@ def outage_document(result: OutageRun, name: str) -> Document:
             ("Motion", motion_words(result)),
             ("Start", start_words(result)),
             ("Remaining measurements", ", ".join(result.stays) or "none"),
-            ("Software", f"strapdown {__version__}"),
         ),
-        blocks(
+        (
             KeyFigures(key_figures(result)),
             Paragraph(remedy(result), "lead"),
             paragraph(inside_words(result)),
             cone_chart(result),
         ),
         sections,
-        title,
+        footer=title,
     )
 
 
@@ -403,19 +395,10 @@ def time_table(result: OutageRun) -> TableBlock:
         )
     many = len(result.equal)
     said = "" if many < 2 else f" Root mean square over {many} outages."
+    sides = (f"{name} ±" for name in ("along", "across", "vertical", "speed", "heading"))
     return TableBlock(
-        (
-            "after",
-            "horizontal, 1 sd",
-            "horizontal, 95 %",
-            "along ±",
-            "across ±",
-            "vertical ±",
-            "speed ±",
-            "heading ±",
-        ),
+        ("after", "horizontal, 1 sd", "horizontal, 95 %", *sides),
         tuple(rows),
-        text=(0,),
         caption="Horizontal: root of both variances, and semi-major axis of the 95 % ellipse. "
         f"Others: 95 %, 1.96 standard deviations.{said}",
         strong=(len(rows) - 1,),
@@ -424,29 +407,22 @@ def time_table(result: OutageRun) -> TableBlock:
 
 def budget_table(result: OutageRun) -> TableBlock:
     """Contribution of each error source to the horizontal drift at the end."""
-    found = result.forecast
-    whole = float(found.variance("horizontal")[-1])
-    rows, rest = [], 0.0
-    for share in found.shares:
-        part = float(share.variance["horizontal"][-1]) / whole
-        if abs(part) < _LEAST:
+    found, rest = result.forecast, 0.0
+    rows = []
+    for name, part, share in _parts(result):
+        if share is None:
+            rows.append((part, name, "", "–"))
+        elif abs(part) < _LEAST:
             rest += part
-            continue
-        alone = float(share.alone["horizontal"][-1])
-        rows.append(
-            (
-                part,
-                source_words(share.source.name),
-                at_start(share, result),
-                length_words(alone) if math.isfinite(alone) else "–",
-            )
-        )
-    if found.aids:
-        rows.append((float(found.aids["horizontal"][-1]) / whole, aids_name, "", "–"))
+        else:
+            alone = float(share.alone["horizontal"][-1])
+            size = length_words(alone) if math.isfinite(alone) else "–"
+            rows.append((part, name, at_start(share, result), size))
     rows.sort(key=lambda row: -row[0])
     told = [(name, size, alone, *_part(part)) for part, name, size, alone in rows]
     if abs(rest) >= 5e-5:
         told.append(("all others", "", "", *_part(rest)))
+    whole = float(found.variance("horizontal")[-1])
     told.append(("total", "", length_words(math.sqrt(whole)), f"100{GAP}%", ""))
     return TableBlock(
         ("source", "1 sd at the start", "alone", "share of the variance", ""),
@@ -460,6 +436,19 @@ def budget_table(result: OutageRun) -> TableBlock:
     )
 
 
+def _parts(result: OutageRun) -> list[tuple[str, float, Share | None]]:
+    """Each source of the drift with its share of the final variance; last the measurements."""
+    found = result.forecast
+    whole = float(found.variance("horizontal")[-1])
+    parts: list[tuple[str, float, Share | None]] = [
+        (source_words(s.source.name), float(s.variance["horizontal"][-1]) / whole, s)
+        for s in found.shares
+    ]
+    if found.aids:
+        parts.append((aids_name, float(found.aids["horizontal"][-1]) / whole, None))
+    return parts
+
+
 def _part(part: float) -> tuple[str, str]:
     size = f"{plain(100.0 * part, 1)}{GAP}%" if part < 0.0 else share_words(min(part, 0.9999))
     return size, "█" * round(_BAR * part) if part > 0.0 else ""
@@ -467,33 +456,25 @@ def _part(part: float) -> tuple[str, str]:
 
 def drift_table(result: OutageRun) -> TableBlock | None:
     """Table of the outage tests."""
-    drifts = drifts_of(result.drifts)
-    if not drifts:
-        return None
     rows = [
         (
             f"{plain(d.span.begin, 1)}{GAP}s",
             duration_words(d.since_fix),
             f"{plain(float(d.time[-1]), 1)}{GAP}s",
-            length_words(float(d.horizontal[-1])),
-            length_words(float(d.along[-1])),
-            length_words(float(d.across[-1])),
-            length_words(float(d.down[-1])),
+            *(length_words(float(v[-1])) for v in (d.horizontal, d.along, d.across, d.down)),
             length_words(float(d.bound[-1])),
             share_words(float(d.inside.mean())),
         )
-        for d in drifts
+        for d in drifts_of(result.drifts)
     ]
-    return TableBlock(
-        (
-            *("outage from", "after a fix", "fixes to", "drift", "along", "across", "down"),
-            *("predicted, 95 %", "fixes within"),
-        ),
-        tuple(rows),
-        text=(),
-        caption="Drift at the last fix of each outage, computed − fix, and the share of its fixes "
+    return table_of(
+        "outage from | after a fix | fixes to | drift | along | across | down | predicted, 95 % "
+        "| fixes within",
+        rows,
+        "Drift at the last fix of each outage, computed − fix, and the share of its fixes "
         "within their 95 % ellipses, which include the noise of the fixes. After a fix: time from "
         "the last fix that was used to the begin.",
+        text=(),
     )
 
 
@@ -518,17 +499,18 @@ def cone_chart(result: OutageRun) -> Chart:
     found = result.forecast
     time, bound, variances = result.cone
     sd = np.sqrt(np.maximum(variances["horizontal"], 0.0))
-    lines = [
-        *_came(result, lambda d: d.horizontal),
+    lines: list[Line] = []
+    for d in drifts_of(result.equal):
+        lines.append(Line(_INSIDE, d.time, d.horizontal, GREY, "solid", 1.0))
+        if not d.inside.all():
+            out = ~d.inside
+            lines.append(dots(_OUTSIDE, d.time[out], d.horizontal[out], VERMILLION, "circle", 5.0))
+    lines += [
         Line("1 standard deviation", time, sd, BLUE, "dash", 1.6),
         Line("95 % bound", time, bound, BLUE, "solid", 2.2),
     ]
-    cone = Panel(
-        "horizontal drift, m",
-        tuple(lines),
-        fills=(Fill("95 % bound", time, np.zeros_like(time), bound, BLUE, 0.13),),
-        height=1.4,
-    )
+    band = Fill("95 % bound", time, np.zeros_like(time), bound, BLUE, 0.13)
+    cone = Panel("horizontal drift, m", tuple(lines), fills=(band,), height=1.4)
     fills, note = _stack(result)
     stack = Panel(
         "1 standard deviation, m",
@@ -536,12 +518,11 @@ def cone_chart(result: OutageRun) -> Chart:
         fills=fills,
         title="Shares of the drift",
     )
-    tried = _tried(result)
     return Chart(
         "cone",
         "Horizontal drift over the outage",
-        f"Above: horizontal drift.{tried} Below: its standard deviation, divided by shares of the "
-        f"variance.{note}",
+        f"Above: horizontal drift.{_tried(result)} Below: its standard deviation, divided by "
+        f"shares of the variance.{note}",
         TIME,
         (cone, stack),
     )
@@ -559,28 +540,6 @@ def _tried(result: OutageRun) -> str:
     if falls:
         said += " A bound falls where a remaining measurement, as at a standstill, corrects it."
     return said + left_out_words(result)
-
-
-def _came(result: OutageRun, value: object) -> list[Line]:
-    """Observed drifts over time."""
-    lines = []
-    for d in drifts_of(result.equal):
-        y = np.asarray(value(d))  # type: ignore[operator]
-        lines.append(Line(_INSIDE, d.time, y, GREY, "solid", 1.0))
-        if not d.inside.all():
-            out = ~d.inside
-            lines.append(
-                Line(
-                    _OUTSIDE,
-                    d.time[out],
-                    y[out],
-                    VERMILLION,
-                    points=True,
-                    symbol="circle",
-                    size=5.0,
-                )
-            )
-    return lines
 
 
 def _stack(result: OutageRun) -> tuple[tuple[Fill, ...], str]:
@@ -628,29 +587,20 @@ def plane_chart(result: OutageRun) -> Chart:
         planes[:, 0, 0] = variance["along"]
         planes[:, 1, 1] = variance["across"]
     lines = []
-    for k, share in enumerate(_RINGS):
+    for k, (share, dash) in enumerate(
+        zip(_RINGS, ("dot", "dashdot", "dash", "solid"), strict=True)
+    ):
         at = share * result.spec.outage_s
         row = int(np.argmin(np.abs(time - at)))
         # Cross-track to the right, along-track upward.
         ring = ellipse(np.zeros(2), planes[row][::-1, ::-1], _CORNERS)
-        ring = np.vstack([ring, ring[:1]])
+        east, north = np.vstack([ring, ring[:1]]).T
         name = f"95 % after {duration_words(at)}"
-        lines.append(
-            Line(
-                name,
-                ring[:, 0],
-                ring[:, 1],
-                BLUE,
-                ("dot", "dashdot", "dash", "solid")[k],
-                1.2 + 0.3 * k,
-                inside=0.06,
-            )
-        )
+        lines.append(Line(name, east, north, BLUE, dash, 1.2 + 0.3 * k, inside=0.06))
     for d in drifts_of(result.equal):
         lines.append(Line(_INSIDE, d.across, d.along, GREY, "solid", 1.0))
         name, colour = ("drift at the last fix", GREY) if d.inside[-1] else (_OUTSIDE, VERMILLION)
-        ends = d.across[-1:], d.along[-1:]
-        lines.append(Line(name, *ends, colour, points=True, symbol="circle", size=7.0))
+        lines.append(dots(name, d.across[-1:], d.along[-1:], colour, "circle", 7.0))
     panel = Panel("along track, m", tuple(lines), x_label="cross track, to the right, m")
     return Chart(
         "plane",
@@ -664,50 +614,45 @@ def plane_chart(result: OutageRun) -> Chart:
 def parts_chart(result: OutageRun) -> Chart:
     """Along-track, cross-track, height, speed and heading over the outage."""
     time, _, variances = result.cone
-
-    def bound(quantity: str, factor: float = 1.0) -> Array:
-        values = np.maximum(variances[quantity], 0.0)
-        return np.asarray(factor * TWO_SIDED_95 * np.sqrt(values))
-
-    place = (
-        Line("along", time, bound("along"), VERMILLION, "solid", 1.8),
-        Line("across", time, bound("across"), GREEN, "dash", 1.8),
-        Line("vertical", time, bound("vertical"), BLUE, "dot", 1.8),
-    )
-    speed = (Line("horizontal speed", time, bound("speed"), BLACK, "solid", 1.6),)
-    heading = (Line("heading", time, bound("heading", math.degrees(1.0)), BLACK, "dash", 1.6),)
+    panels = []
+    for label, factor, lines in (
+        (
+            "position ±, m",
+            1.0,
+            (
+                ("along", "along", VERMILLION, "solid", 1.8),
+                ("across", "across", GREEN, "dash", 1.8),
+                ("vertical", "vertical", BLUE, "dot", 1.8),
+            ),
+        ),
+        ("velocity ±, m/s", 1.0, (("horizontal speed", "speed", BLACK, "solid", 1.6),)),
+        ("heading ±, deg", math.degrees(1.0), (("heading", "heading", BLACK, "dash", 1.6),)),
+    ):
+        drawn = []
+        for name, quantity, colour, dash, width in lines:
+            sd = np.sqrt(np.maximum(variances[quantity], 0.0))
+            drawn.append(Line(name, time, factor * TWO_SIDED_95 * sd, colour, dash, width))
+        panels.append(Panel(label, tuple(drawn)))
     return Chart(
         "parts",
         "Position, velocity and heading drift",
         "95 % bounds (1.96 standard deviations).",
         TIME,
-        (
-            Panel("position ±, m", place),
-            Panel("velocity ±, m/s", speed),
-            Panel("heading ±, deg", heading),
-        ),
+        tuple(panels),
     )
 
 
 def budget_chart(result: OutageRun) -> Chart:
     """Shares of the variance at the end, largest first."""
-    found = result.forecast
-    whole = float(found.variance("horizontal")[-1])
-    parts = [
-        (source_words(s.source.name), float(s.variance["horizontal"][-1]) / whole)
-        for s in found.shares
-    ]
-    if found.aids:
-        parts.append((aids_name, float(found.aids["horizontal"][-1]) / whole))
+    parts = [(name, part) for name, part, _ in _parts(result)]
     kept = sorted((p for p in parts if abs(p[1]) >= _LEAST_PART), key=lambda p: -p[1])
     rest = math.fsum(p for _, p in parts) - math.fsum(p for _, p in kept)
     if abs(rest) >= _LEAST_PART:
         kept.append(("all others", rest))
-    values = 100.0 * np.array([p for _, p in kept])
     bars = Bars(
         "share",
         np.arange(len(kept), dtype=np.float64),
-        values,
+        100.0 * np.array([p for _, p in kept]),
         BLUE,
         labels=tuple(share_words(p) if p > 0.0 else f"{100.0 * p:.1f} %" for _, p in kept),
         legend=False,

@@ -14,7 +14,7 @@ import numpy as np
 from strapdown.formats import csv
 from strapdown.report.chart import BLUE, VERMILLION, Chart, Panel, curve
 from strapdown.report.chart import BUCKETS_OVER_TIME as BUCKETS
-from strapdown.report.document import TableBlock
+from strapdown.report.document import TableBlock, table_of
 from strapdown.report.navigation_evaluation import NavigationEvaluation, reference_words, rms
 from strapdown.report.values import duration_words, length_words, plain
 
@@ -51,19 +51,12 @@ def paired_table(evaluation: NavigationEvaluation) -> TableBlock | None:
             _ratio(sizes[3], sizes[2]),
         )
     )
-    return TableBlock(
-        (
-            "after",
-            f"velocity, {one.kind}",
-            other.kind,
-            f"position, {one.kind}",
-            other.kind,
-            "ratio",
-        ),
-        tuple(rows),
-        text=(0,),
-        caption="Horizontal errors of the same record with both corrections of the estimated "
-        f"errors, relative to {reference_words(evaluation.run)}.",
+    kinds = f"{one.kind} | {other.kind}"
+    return table_of(
+        f"after | velocity, {kinds} | position, {kinds} | ratio",
+        rows,
+        "Horizontal errors of the same record with both corrections of the estimated errors, "
+        f"relative to {reference_words(evaluation.run)}.",
         strong=(len(rows) - 1,),
     )
 
@@ -85,12 +78,12 @@ def paired_chart(evaluation: NavigationEvaluation) -> Chart | None:
             lines.append(curve(name, one.time, sd, colour, "dot", 1.1, buckets=BUCKETS))
         panels.append(Panel(label, tuple(lines)))
     return over_time(
+        evaluation.run.filtered,
         "paired",
         "With two corrections of the estimated errors",
         f"Lengths of the horizontal errors relative to {reference_words(evaluation.run)}: with "
         f"{pair[0].kind} and with {pair[1].kind}. Dotted: as stated, one standard deviation.",
-        tuple(panels),
-        evaluation.run.filtered,
+        panels,
     )
 
 
@@ -120,20 +113,17 @@ def write_paired(evaluation: NavigationEvaluation, folder: Path, comments: dict[
     pair = evaluation.pair
     if not pair:
         return
-    one = pair[0]
-    columns = {"time_s": one.time}
+    columns = {"time_s": pair[0].time}
     for each in pair:
-        at = each.time
         for name, values in (
             ("velocity_error_m_s", each.velocity),
             ("velocity_sd_m_s", each.velocity_sd),
             ("position_error_m", each.position),
             ("position_sd_m", each.position_sd),
         ):
-            columns[f"{each.kind}_{name}"] = np.interp(one.time, at, values)
-    csv.write(
-        folder / "paired.csv", columns, {**comments, "against": reference_words(evaluation.run)}
-    )
+            columns[f"{each.kind}_{name}"] = np.interp(pair[0].time, each.time, values)
+    against = {**comments, "against": reference_words(evaluation.run)}
+    csv.write(folder / "paired.csv", columns, against)
 
 
 def _ratio(more: float, less: float) -> str:

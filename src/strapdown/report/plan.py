@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from strapdown.dsp.chi_square import PLANE_95
-from strapdown.report.chart import BLACK, GREEN, VERMILLION, Array, Line
+from strapdown.report.chart import BLACK, GREEN, VERMILLION, Array, Line, dots
 from strapdown.report.svg_drawing import overlap
 
 Path = tuple[Array, Array]
@@ -91,16 +91,16 @@ def path_marks(time: Array, paths: list[Path], view: PlanView, colour: str) -> l
     east, north = paths[0]
     way = _way(east, north)
     ends = [(float(east[k]), float(north[k])) for k in (0, -1)]
-    dots: list[tuple[float, float]] = []
+    seen: list[tuple[float, float]] = []
     labels, lengths = [], [0.0]
     for at in _round_times(float(time[0]), float(time[-1])):
         place = (float(np.interp(at, time, east)), float(np.interp(at, time, north)))
         # Skip positions near the start, the end or another mark, as of a stationary vehicle.
-        if all(np.hypot(place[0] - x, place[1] - y) > _APART * view.width for x, y in ends + dots):
-            dots.append(place)
+        if all(np.hypot(place[0] - x, place[1] - y) > _APART * view.width for x, y in ends + seen):
+            seen.append(place)
             labels.append(f"{at + 0.0:.12g} s")  # without the sign of -0
             lengths.append(float(np.interp(at, time, way)))
-    points = np.array(ends + dots)
+    points = np.array(ends + seen)
     places = place_labels(
         points[:, 0],
         points[:, 1],
@@ -114,22 +114,12 @@ def path_marks(time: Array, paths: list[Path], view: PlanView, colour: str) -> l
         ("time", points[2:], BLACK, "circle", 6.0, tuple(labels), places[2:]),
     ]
     tips = _between(np.array([*lengths, way[-1]]), view.width)
-    return [_arrows(east, north, tips, _ARROW * view.width, colour)] + [
-        Line(
-            name,
-            xy[:, 0],
-            xy[:, 1],
-            mark,
-            points=True,
-            symbol=symbol,
-            size=size,
-            labels=words,
-            places=where,
-            legend=False,
-        )
-        for name, xy, mark, symbol, size, words, where in marks
-        if len(xy)
-    ]
+    lines = [_arrows(east, north, tips, _ARROW * view.width, colour)]
+    for name, xy, mark, symbol, size, words, where in marks:
+        if len(xy):
+            named = dots(name, xy[:, 0], xy[:, 1], mark, symbol, size, labels=words, places=where)
+            lines.append(replace(named, legend=False))
+    return lines
 
 
 def _between(lengths: Array, width: float) -> Array:

@@ -16,9 +16,11 @@ from strapdown.bundle import InputFiles, Seal, write_bundle
 from strapdown.formats import csv
 from strapdown.progress import Progress, silent
 from strapdown.systems.one_thread import one_thread
+from strapdown.tables import EULER
 from strapdown.tables.checks import index_of
 
 if TYPE_CHECKING:
+    from strapdown.alignment.alignment import Alignment
     from strapdown.config.reading import FileSpec
     from strapdown.report.document import Document
 
@@ -147,11 +149,7 @@ class ReportBundle(Generic[R]):
             write_bundle(
                 Path(out),
                 command=self.command,
-                configuration={
-                    "name": name,
-                    **self.configuration(run),
-                    **left_out,
-                },
+                configuration={"name": name, **self.configuration(run), **left_out},
                 inputs=run.inputs,
                 force=force,
                 seals=seals,
@@ -208,6 +206,17 @@ def write_table(table: pd.DataFrame, path: Path, comments: dict[str, str]) -> No
 def as_comments(rows: Iterable[tuple[str, str]]) -> dict[str, str]:
     """Return named texts, such as conventions, as comments of a table or keys of a JSON."""
     return {name.lower().replace(" ", "_"): text for name, text in rows}
+
+
+def alignment_data(one: Alignment) -> dict[str, Any]:
+    """Method, instant, angles and their standard deviations of an alignment, deg, as plain data."""
+    angles, sd = one.roll_pitch_heading, one.sd_deg
+    return {
+        "method": one.method,
+        "time_s": one.time,
+        **{f"{a}_deg": float(angles[k]) for k, a in enumerate(EULER)},
+        **{f"{a}_sd_deg": float(sd[k]) for k, a in enumerate(EULER)},
+    }
 
 
 def finite(value: T) -> T:

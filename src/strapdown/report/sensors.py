@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import pandas as pd
 
-from strapdown import __version__
 from strapdown.bundle import InputFiles, Seal, sensor_file, write_json
 from strapdown.config.outage import OutageSpec, SensorsSpec
 from strapdown.config.spec import specify
@@ -20,7 +19,16 @@ from strapdown.errors import ConfigError, Finding
 from strapdown.formats import csv
 from strapdown.progress import Progress, silent
 from strapdown.report.chart import Chart, Line, Panel, look
-from strapdown.report.document import Document, Items, TableBlock, findings_list, run_again, section
+from strapdown.report.document import (
+    Document,
+    TableBlock,
+    document_of,
+    findings_list,
+    listed,
+    run_again,
+    section,
+    table_of,
+)
 from strapdown.report.report_bundle import ReportBundle, finite, with_page
 from strapdown.report.values import length_words, three_digits
 from strapdown.sensors.allan import allan_model
@@ -246,17 +254,13 @@ def drift_block(run: SensorsRun) -> TableBlock | None:
     """Return the standard deviations of each sensor at the end of the outage."""
     if run.drift.empty:
         return None
-    rows = tuple(
-        (
-            str(name),
-            length_words(row["position_sd_m"]),
-            *(three_digits(row[c]) for c in ("tilt_sd_deg", "heading_sd_deg")),
-        )
-        for name, row in run.drift.groupby("sensor", sort=False).last().iterrows()
-    )
+    rows = []
+    for name, row in run.drift.groupby("sensor", sort=False).last().iterrows():
+        angles = (three_digits(row[c]) for c in ("tilt_sd_deg", "heading_sd_deg"))
+        rows.append((str(name), length_words(row["position_sd_m"]), *angles))
     after = f"after {run.spec.outage_s:g} s without fixes at {run.spec.speed_m_per_s:g} m/s"
-    columns = ("sensor", "position", "roll and pitch, deg", "heading, deg")
-    return TableBlock(columns, rows, caption=f"Standard deviations {after}.")
+    columns = "sensor | position | roll and pitch, deg | heading, deg"
+    return table_of(columns, rows, f"Standard deviations {after}.")
 
 
 def figures_block(sensor: Sensor) -> TableBlock:
@@ -301,15 +305,14 @@ def drift_chart(run: SensorsRun) -> Chart | None:
         for k, sensor in enumerate(run.sensors):
             kept = run.drift[run.drift["sensor"] == sensor.name]
             if len(kept):
-                lines.append(
-                    _line(sensor.name, kept["time"].to_numpy(), kept[column].to_numpy(), k)
-                )
+                values = kept["time"].to_numpy(), kept[column].to_numpy()
+                lines.append(_line(sensor.name, *values, k))
         if lines:
             panels.append(Panel(label, tuple(lines), log=True))
+    if not panels:
+        return None
     title = "Drift without fixes, standard deviation"
-    return (
-        Chart("drift", title, "", "time since the last fix, s", tuple(panels)) if panels else None
-    )
+    return Chart("drift", title, "", "time since the last fix, s", tuple(panels))
 
 
 def _line(name: str, x: Any, y: Any, k: int) -> Line:
@@ -318,26 +321,26 @@ def _line(name: str, x: Any, y: Any, k: int) -> Line:
 
 def sensors_document(run: SensorsRun, name: str) -> Document:
     """Return the page of a comparison."""
-    sections = [
+    sections = (
         section("deviations", "Noise", allan_chart(run)),
         section("drift", "Drift in an outage", drift_chart(run)),
         *(
             section(one.name, f"Figures of {one.name}", figures_block(one), folded=True)
             for one in run.sensors
         ),
-        section("method", "Method", Items(tuple(("", text) for text in METHOD)), folded=True),
+        section("method", "Method", listed(METHOD), folded=True),
         section("again", "Check this folder", *run_again(name)),
-    ]
-    front = [list_block(catalogue_table(run.sensors)), drift_block(run)]
-    if run.findings:
-        front.append(findings_list(run.findings, "cli"))  # type: ignore[arg-type]
-    title = ", ".join(one.name for one in run.sensors)
-    return Document(
-        title,
+    )
+    return document_of(
+        ", ".join(one.name for one in run.sensors),
         "Sensors compared",
-        (("Software", f"strapdown {__version__}"),),
-        tuple(block for block in front if block is not None),
-        tuple(sections),
+        (),
+        (
+            list_block(catalogue_table(run.sensors)),
+            drift_block(run),
+            findings_list(run.findings, "cli") if run.findings else None,
+        ),
+        sections,
         links=(("sensors.json", "figures and drift"), ("drift.csv", "drift over time")),
     )
 
@@ -345,18 +348,11 @@ def sensors_document(run: SensorsRun, name: str) -> Document:
 def sensors_json(run: SensorsRun) -> dict[str, Any]:
     """Return a comparison as plain data for programs."""
     ends = run.drift.groupby("sensor").last().drop(columns="time").to_dict("index")
-    compared = [
-        {
-            **sensor_json(sensor),
-            "drift": ends.get(sensor.name),
-        }
-        for sensor in run.sensors
-    ]
     return finite(
         {
             "outage_s": run.spec.outage_s,
             "speed_m_per_s": run.spec.speed_m_per_s,
-            "sensors": compared,
+            "sensors": [{**sensor_json(s), "drift": ends.get(s.name)} for s in run.sensors],
             "findings": [one.plain("cli") for one in run.findings],
         }
     )
@@ -375,10 +371,8 @@ def sensor_json(sensor: Sensor) -> dict[str, Any]:
 def _write_data(run: SensorsRun, folder: Path) -> None:
     write_json(folder / "sensors.json", sensors_json(run))
     for file, table in (("deviations", run.deviations), ("drift", run.drift)):
-        columns = {
-            {"tau": "tau_s", "time": "time_s"}.get(str(c), str(c)): table[c].to_numpy()
-            for c in table.columns
-        }
+        renamed = table.rename(columns={"tau": "tau_s", "time": "time_s"})
+        columns = {str(c): renamed[c].to_numpy() for c in renamed.columns}
         csv.write(folder / f"{file}.csv", columns, {})
 
 

@@ -28,13 +28,14 @@ from strapdown.report.chart import BLUE, ORANGE, Array, Chart, Line, Panel, brea
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.crash_simulation import stated_errors
 from strapdown.report.plan import PlanView, path_marks
+from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import Motion, PulseMotion, TriadErrors
 from strapdown.systems.trajectory_source import (
     SimulatedTrajectory,
     scenario_of,
     simulate_trajectory,
 )
-from strapdown.tables import EULER, places_of
+from strapdown.tables import EULER, NED, QUATERNION, VELOCITY, places_of
 from strapdown.tables.checks import index_of
 
 
@@ -45,32 +46,16 @@ def write_simulation(
     force: bool = False,
     made: tuple[pd.DataFrame, pd.DataFrame] | None = None,
 ) -> Seal:
-    """Write a simulated scenario.
+    """Write a simulated scenario into a new folder: ``log.*``, ``truth.csv``, ``scenario.json``.
 
-    Parameters
-    ----------
-    out : Path
-        Folder to create.
-    force : bool
-        Overwrite an existing bundle.
-    made : (DataFrame, DataFrame), optional
-        From `simulate_scenario` of this specification, if it has been simulated already.
-
-    Returns
-    -------
-    Seal
-        The folder holds ``log.*``, ``truth.csv`` and ``scenario.json``.
-
-    Raises
-    ------
-    ConfigError
-        A format is unknown, or `out` may not be written.
+    `made`: from `simulate_scenario` of this specification, if it has been simulated already.
+    `force`: overwrite an existing bundle. ConfigError: a format is unknown, or `out` may not be
+    written.
     """
     check_destination(out, force)
     formats = log_formats(spec.formats)
     imu, truth = made or simulate_scenario(spec.scenario)
     scenario = scenario_of(spec.scenario)
-    errors = scenario_errors(spec.scenario)
     seals: list[Seal] = []
     with write_bundle(
         out,
@@ -96,18 +81,23 @@ def write_simulation(
             **_describe_motion(scenario.motion),
             "references": scenario.references,
             "sensor": spec.scenario.sensor and Path(spec.scenario.sensor).name,
-            "gyro_errors": stated_errors(errors.gyro, "rad_per_s"),
-            "accel_errors": stated_errors(errors.accel or TriadErrors(), "m_per_s2"),
+            **_stated(scenario_errors(spec.scenario)),
             "final_attitude": {
                 "time_s": float(truth.index[-1]),
-                "q_nb": [float(final[q]) for q in ("q_w", "q_x", "q_y", "q_z")],
-                "roll_deg": float(final["roll"]),
-                "pitch_deg": float(final["pitch"]),
-                "heading_deg": float(final["heading"]),
+                "q_nb": [float(final[q]) for q in QUATERNION],
+                **{f"{angle}_deg": float(final[angle]) for angle in EULER},
             },
         }
         write_json(folder / "scenario.json", description)
     return seals[0]
+
+
+def _stated(errors: ImuErrors) -> dict[str, Any]:
+    """Errors of the simulated sensor, SI."""
+    return {
+        "gyro_errors": stated_errors(errors.gyro, "rad_per_s"),
+        "accel_errors": stated_errors(errors.accel or TriadErrors(), "m_per_s2"),
+    }
 
 
 def _describe_motion(motion: Motion) -> dict[str, object]:
@@ -140,17 +130,9 @@ def _fields(thing: object) -> dict[str, object]:
 
 
 # Row of a Trajectory table as keys with units.
-_ROW = {
-    "lat": "lat_deg",
-    "lon": "lon_deg",
-    "alt": "alt_m",
-    "VN": "v_north_m_per_s",
-    "VE": "v_east_m_per_s",
-    "VD": "v_down_m_per_s",
-    "roll": "roll_deg",
-    "pitch": "pitch_deg",
-    "heading": "heading_deg",
-}
+_ROW = {"lat": "lat_deg", "lon": "lon_deg", "alt": "alt_m"}
+_ROW |= {v: f"v_{axis}_m_per_s" for v, axis in zip(VELOCITY, NED, strict=True)}
+_ROW |= {angle: f"{angle}_deg" for angle in EULER}
 
 
 def write_trajectory_simulation(
@@ -160,27 +142,12 @@ def write_trajectory_simulation(
     force: bool = False,
     made: SimulatedTrajectory | None = None,
 ) -> Seal:
-    """Write a simulated trajectory.
+    """Write a simulated trajectory into a new folder, as `write_simulation`.
 
-    Parameters
-    ----------
-    out : Path
-        Folder to create.
-    force : bool
-        Overwrite an existing bundle.
-
-    Returns
-    -------
-    Seal
-        The folder holds ``log.*`` (rad/s, m/s², body forward-right-down, with the true attitude in
-        further columns), ``fixes.csv`` of the stated receiver, ``trajectory.csv`` and other
-        formats, ``trajectory.svg``, its picture, and ``scenario.json`` with the resolved
-        configuration.
-
-    Raises
-    ------
-    ConfigError
-        As `simulate_trajectory`; a format is unknown, or `out` may not be written.
+    The folder holds ``log.*`` (rad/s, m/s², body forward-right-down, with the true attitude in
+    further columns), ``fixes.csv`` of the stated receiver, ``trajectory.csv`` and other formats,
+    ``trajectory.svg``, its picture, and ``scenario.json`` with the resolved configuration. Errors
+    as of `simulate_trajectory`, too.
     """
     check_destination(out, force)
     formats = log_formats(spec.formats)
@@ -211,9 +178,8 @@ def write_trajectory_simulation(
         for name in dict.fromkeys(("csv", *spec.trajectory_formats)):
             path = folder / f"trajectory.{name}"
             WRITERS[name].write(path, {"reference": trajectory}, options)
-        ChartFigure(simulation_chart(spec, trajectory)).save(
-            folder / "trajectory.svg", caption=True
-        )
+        picture = ChartFigure(simulation_chart(spec, trajectory))
+        picture.save(folder / "trajectory.svg", caption=True)
         shape = motion.ellipsoid
         sensor = spec.sensor and Path(spec.sensor).name
         description: dict[str, Any] = {
@@ -232,8 +198,7 @@ def write_trajectory_simulation(
                 "rotation_rate_rad_per_s": shape.rotation_rate,
             },
             "sensor": sensor,
-            "gyro_errors": stated_errors(errors.gyro, "rad_per_s"),
-            "accel_errors": stated_errors(errors.accel or TriadErrors(), "m_per_s2"),
+            **_stated(errors),
             "start": _state(trajectory, 0),
             "end": _state(trajectory, -1),
             "configuration": configuration | ({"sensor": sensor} if sensor else {}),
@@ -243,13 +208,7 @@ def write_trajectory_simulation(
 
 
 def simulation_chart(spec: TrajectorySpec, trajectory: pd.DataFrame) -> Chart:
-    """Return the chart of a simulated trajectory, titled as its file states.
-
-    Parameters
-    ----------
-    trajectory : DataFrame
-        A Trajectory table.
-    """
+    """Return the chart of a simulated Trajectory table, titled as its file states."""
     title = one_line(spec.title) or one_line(spec.name)
     return trajectory_chart(trajectory, title=title, ellipsoid=find_ellipsoid(spec.ellipsoid))
 
@@ -385,23 +344,16 @@ def _plan(drawn: list[_Drawn], reach: float) -> Panel:
         for d, path in zip(drawn, paths, strict=True)
     ]
     lines += path_marks(drawn[0].time, paths, view, drawn[0].colour)
-    return Panel(
-        f"north of the start, {unit}",
-        tuple(lines),
-        x_label=f"east of the start, {unit}",
-        height=view.height,
-    )
+    east, north = (f"{side} of the start, {unit}" for side in ("east", "north"))
+    return Panel(north, tuple(lines), x_label=east, height=view.height)
 
 
 def _over_time(label: str, drawn: list[_Drawn], values: list[Array]) -> Panel:
-    lines = tuple(
-        replace(
-            curve(d.name, index_of(d.table), v, d.colour, d.dash, buckets=BUCKETS),
-            legend=d.legend,
-        )
-        for d, v in zip(drawn, values, strict=True)
-    )
-    return Panel(label, lines, height=_LOW, steady=_STEADY)
+    lines = []
+    for d, v in zip(drawn, values, strict=True):
+        line = curve(d.name, index_of(d.table), v, d.colour, d.dash, buckets=BUCKETS)
+        lines.append(replace(line, legend=d.legend))
+    return Panel(label, tuple(lines), height=_LOW, steady=_STEADY)
 
 
 def _wrapped(headings: list[Array]) -> tuple[list[Array], str]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+import pandas as pd
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.dsp.chi_square import plane_bound
@@ -34,6 +35,7 @@ from strapdown.report.chart import (
     Line,
     Panel,
     curve,
+    dots,
 )
 from strapdown.report.document import (
     Block,
@@ -43,8 +45,10 @@ from strapdown.report.document import (
     TableBlock,
     blocks,
     capital,
+    items_of,
     paragraph,
     section,
+    table_of,
 )
 from strapdown.report.navigation_evaluation import NavigationEvaluation, heading_spans
 from strapdown.report.values import (
@@ -89,24 +93,17 @@ def bound_words(evaluation: NavigationEvaluation) -> str:
     result, bounds = evaluation.run, evaluation.bounds
     end, worst = float(bounds[-1]), int(np.argmax(bounds))
     most, at = float(bounds[worst]), float(result.record.sd.index[worst])
+    sized = f"Position bound, 95{GAP}%: {length_words(end)} at the end"
     # A run whose bound is largest at the end needs only one number.
-    same = most <= 1.1 * end
-    sized = f"{length_words(end)} at the end" + (
-        "" if same else f", {length_words(most)} at most (at {instant(at)})"
-    )
+    if most > 1.1 * end:
+        sized += f", {length_words(most)} at most (at {instant(at)})"
     sized += f", {arm}" if (arm := without_arm(result)) else ""
     first = result.trust.against_bounds
     if not result.trust.consistency:
-        return (
-            f"Position bound, 95{GAP}%: {sized}, if the sensor errors are as stated. No "
-            "measurement confirms it."
-        )
+        return f"{sized}, if the sensor errors are as stated. No measurement confirms it."
     if first is None:
-        return f"Position bound, 95{GAP}%: {sized}. The measurements confirm it."
-    return (
-        f"Position bound, 95{GAP}%: {sized}. The measurements contradict it: {first.name} "
-        f"{_KINDS[first.kind]}."
-    )
+        return f"{sized}. The measurements confirm it."
+    return f"{sized}. The measurements contradict it: {first.name} {_KINDS[first.kind]}."
 
 
 def heading_words(trust: IntegrityReport) -> str:
@@ -168,10 +165,8 @@ def unconfirmed_words(trust: IntegrityReport) -> str:
 
 def promise(trust: IntegrityReport) -> tuple[tuple[str, str], ...]:
     """Return the definition of each status color, in words and numbers."""
-    trusted, rejected = (
-        plain(trust.heading.trusted_below, 1),
-        plain(trust.heading.rejected_beyond, 1),
-    )
+    heading = trust.heading
+    trusted, rejected = (plain(x, 1) for x in (heading.trusted_below, heading.rejected_beyond))
     return (
         (
             "Trusted (green)",
@@ -251,17 +246,11 @@ def first_words(trust: IntegrityReport) -> str:
         return "No measurement was processed, so no inconsistency can be found."
     if one is None:
         return "All innovations are consistent, or their inconsistency is too small to matter."
-    when = (
-        f"from the first epoch, at {instant(one.since)}"
-        if one.throughout
-        else f"at {instant(one.since)}"
-    )
-    where = one.component.partition(",")[0]
+    begin = "from the first epoch, " if one.throughout else ""
     meaning = one.finding.remedy or ""
     return (
-        f"First inconsistency: {one.name}, component {where}, {when}: "
-        f"{one.finding.what}. "
-        f"{meaning[:1].upper()}{meaning[1:]}."
+        f"First inconsistency: {one.name}, component {one.component.partition(',')[0]}, "
+        f"{begin}at {instant(one.since)}: {one.finding.what}. {meaning[:1].upper()}{meaning[1:]}."
     )
 
 
@@ -270,37 +259,44 @@ def repeated_words(result: NavigationRun) -> str:
     trust = result.trust
     repeated = trust.repeated
     if repeated is None:
-        if trust.first is None:
-            return ""
-        return "Not re-run without it: repeat is false in [trust]."
+        return "" if trust.first is None else "Not re-run without it: repeat is false in [trust]."
     if repeated.record is None or repeated.differences is None:
         failed = "" if repeated.failed is None else repeated.failed.text()
         return f"Re-run {repeated.change.what}, the run fails: {failed}"
     table = repeated.differences
-    place = np.hypot(table["north"].to_numpy(), table["east"].to_numpy())
-    turn = np.abs(table["heading"].to_numpy(dtype=np.float64))
+    place, turn = apart(table)
     before, after = len(trust.inconsistencies), len(repeated.left)
-    rest = (
-        "all remaining measurements are consistent"
-        if not after
-        else f"{after} of {before} inconsistencies remain"
-        if after < before
-        else "the remaining measurements are no more consistent"
+    rest = "the remaining measurements are no more consistent"
+    if not after:
+        rest = "all remaining measurements are consistent"
+    elif after < before:
+        rest = f"{after} of {before} inconsistencies remain"
+    # The run with more information differs from the other by at most that one's error (Kalman).
+    own = np.interp(
+        index_of(table), index_of(repeated.record.sd), plane_bound(repeated.record.covariance)
     )
-    beyond = _beyond(
-        index_of(table),
-        place,
-        index_of(repeated.record.sd),
-        plane_bound(repeated.record.covariance),
-    )
+    share = float(np.mean(place > own))
+    beyond = f"beyond the re-run's 95{GAP}% bound for {share_words(share)} of the time"
+    if share == 0.0:
+        beyond = f"always within the re-run's 95{GAP}% bound"
     bound = half(result.filtered.sd["heading"].iloc[-1])
-    usual, most, last = (length_words(float(x)) for x in (np.median(place), max(place), place[-1]))
-    turned = [degrees_words(float(x)) for x in (np.median(turn), max(turn), turn[-1])]
+    (usual, most, last), turned = (
+        [words(float(x)) for x in (np.median(v), max(v), v[-1])]
+        for words, v in ((length_words, place), (degrees_words, turn))
+    )
     return (
         f"Re-run {repeated.change.what}: position differs by {usual} (median), {most} at most "
         f"({beyond}), {last} at the end; heading by {turned[0]} (median), {turned[1]} at most, "
         f"{turned[2]} at the end, where its bound is {degrees_words(bound)}; {rest}."
     )
+
+
+def apart(differences: pd.DataFrame) -> tuple[Array, Array]:
+    """Distances in m and angles in deg of a run from its re-run."""
+    north, east, heading = (
+        differences[c].to_numpy(dtype=np.float64) for c in ("north", "east", "heading")
+    )
+    return np.hypot(north, east), np.abs(heading)
 
 
 def terminal_lines(
@@ -309,30 +305,18 @@ def terminal_lines(
     """Up to five lines for the terminal, each with its style; brief, without the position."""
     result, trust = evaluation.run, evaluation.run.trust
     last = trust.heading.spans[-1].status if trust.heading.spans else "rejected"
-    style = STATUS_STYLES[last]
-    lines = [(heading_words(trust) if brief else answer(evaluation), style)]
+    lines = [(heading_words(trust) if brief else answer(evaluation), STATUS_STYLES[last])]
     if said := worst_words(trust):
         lines.insert(0, (said, STATUS_STYLES["rejected"]))
-    if trust.first is not None:
-        first = trust.first
+    if (first := trust.first) is not None:
         since = "throughout" if first.throughout else f"first at {instant(first.since)}"
-        lines.append(
-            (f"First inconsistency: {first.name} {_KINDS[first.kind]}, {since}.", "yellow")
-        )
-        said = repeated_words(result)
-        if said:
+        text = f"First inconsistency: {first.name} {_KINDS[first.kind]}, {since}."
+        lines.append((text, "yellow"))
+        if said := repeated_words(result):
             lines.append((said, ""))
     elif trust.advice and trust.heading.spans[-1].status != "trusted":
         lines.append((f"For the heading: {advice_words(trust.advice[-1], trust)}.", ""))
     return lines
-
-
-def _beyond(time: np.ndarray, apart: np.ndarray, marks: np.ndarray, bound: np.ndarray) -> str:
-    # The run with more information differs from the other by at most that one's error (Kalman).
-    share = float(np.mean(apart > np.interp(time, marks, bound)))
-    if share == 0.0:
-        return f"always within the re-run's 95{GAP}% bound"
-    return f"beyond the re-run's 95{GAP}% bound for {share_words(share)} of the time"
 
 
 def degrees_words(value: float) -> str:
@@ -378,8 +362,8 @@ def status_words(trust: IntegrityReport) -> str:
 
 
 def _heading(result: NavigationRun) -> tuple[Block, ...]:
-    trust, heading = result.trust, result.trust.heading
-    if not len(heading.table):
+    trust = result.trust
+    if not len(trust.heading.table):
         return ()
     filtered = (
         "The heading status and the re-run are those of the filter, from the measurements up to "
@@ -430,20 +414,18 @@ def _advice(trust: IntegrityReport) -> tuple[Block, ...]:
     )
 
 
-def _reasons(result: NavigationRun) -> TableBlock:
+def _reasons(result: NavigationRun) -> TableBlock | None:
     table = result.trust.heading.table
     rows = []
     for number, status in enumerate(STATUSES):
         those = table[table["status"] == number]
         for reason, count in those["reason"].value_counts().items():
-            share = share_words(count / len(table))
             why = REASONS[str(reason)]
-            if status == "trusted" and check_words(result.trust):
-                why = f"{why}: {check_words(result.trust)}"
-            rows.append((status, why, f"{count}", share))
-    return TableBlock(
-        ("status", "reason", "seconds", "of the time"), tuple(rows), (0, 1), "Heading status"
-    )
+            if status == "trusted" and (check := check_words(result.trust)):
+                why = f"{why}: {check}"
+            rows.append((status, why, f"{count}", share_words(count / len(table))))
+    columns = "status | reason | seconds | of the time"
+    return table_of(columns, rows, "Heading status", text=(0, 1))
 
 
 def _against_truth(result: NavigationRun) -> TableBlock | None:
@@ -458,33 +440,17 @@ def _against_truth(result: NavigationRun) -> TableBlock | None:
         those = size[(number == k) & np.isfinite(size)]
         if len(those):
             within = share_words(float(np.mean(those <= heading.trusted_below)))
-            largest, rms = float(those.max()), math.sqrt(float(np.mean(those**2)))
-            rows.append(
-                (
-                    status,
-                    f"{len(those)}",
-                    within,
-                    f"{plain(rms, 3)}",
-                    f"{plain(largest, 3)}",
-                )
-            )
-    if not rows:
-        return None
-    return TableBlock(
-        (
-            "status",
-            "seconds",
-            f"within {plain(heading.trusted_below, 1)}°",
-            "rms, deg",
-            "largest, deg",
-        ),
-        tuple(rows),
-        (0,),
+            sizes = math.sqrt(float(np.mean(those**2))), float(those.max())
+            rows.append((status, f"{len(those)}", within, *(plain(x, 3) for x in sizes)))
+    limit = plain(heading.trusted_below, 1)
+    return table_of(
+        f"status | seconds | within {limit}° | rms, deg | largest, deg",
+        rows,
         f"Heading error against {result.source.truth_name}, by status",
     )
 
 
-def _quantities(result: NavigationRun) -> tuple[Block, ...]:
+def _quantities(result: NavigationRun) -> tuple[Block | None, ...]:
     """Status of position and velocity, horizontal and vertical, with its shares of the time."""
     rows = []
     for one in result.trust.quantities:
@@ -493,43 +459,38 @@ def _quantities(result: NavigationRun) -> tuple[Block, ...]:
         rows.append((one.name, *shares, status, QUANTITY_REASONS[reason]))
     if not rows:
         return (Paragraph("The run is shorter than a second."),)
-    said = worst_words(result.trust)
     return (
-        *((Paragraph(said, "warning"),) if said else ()),
-        TableBlock(
+        paragraph(worst_words(result.trust), "warning"),
+        table_of(
             ("quantity", *STATUSES, "at the end", "reason"),
-            tuple(rows),
-            (0, 4, 5),
+            rows,
             "Status by the measurements of each quantity: its newest innovations, and how many "
             "were rejected",
+            text=(0, 4, 5),
         ),
     )
 
 
-def _first(result: NavigationRun) -> tuple[Block, ...]:
+def _first(result: NavigationRun) -> tuple[Block | None, ...]:
     trust, repeated = result.trust, result.trust.repeated
-    rows = tuple(
+    rows = [
         (instant(i.since), i.name, i.component.partition(",")[0], _KINDS[i.kind])
         for i in trust.inconsistencies[:_MOST]
-    )
+    ]
     left = () if repeated is None else repeated.left[:_MOST]
-    return blocks(
+    return (
         Paragraph(first_words(trust)),
-        TableBlock(
-            ("since", "measurement", "component", "inconsistency"),
-            rows,
-            (0, 1, 2, 3),
+        table_of(
+            "since | measurement | component | inconsistency",
+            rows if len(rows) > 1 else (),
             "Inconsistencies, first by time; those that hold throughout come after gross errors of "
             "the same measurement, which may cause them",
-        )
-        if len(rows) > 1
-        else None,
+            text=(0, 1, 2, 3),
+        ),
         paragraph(repeated_words(result)),
         repeated_chart(result),
         Paragraph("Inconsistencies of the re-run:") if left else None,
-        Items(tuple((i.name, f"{_KINDS[i.kind]}: {i.finding.what}.") for i in left))
-        if left
-        else None,
+        items_of((i.name, f"{_KINDS[i.kind]}: {i.finding.what}.") for i in left),
     )
 
 
@@ -560,60 +521,41 @@ def heading_chart(result: NavigationRun) -> Chart:
     whole = Span("", float(time[0]), max(float(time[-1]) + 1.0, float(time[0]) + 2.0))
     fills = []
     for name, (colour, half_height) in STATUS_LOOKS.items():
-        those = tuple(one for one in spans if one.name == name)
-        if those:
+        if those := tuple(one for one in spans if one.name == name):
             fills.append(bar(name, those, 0.0, half_height, colour))
     ends = Line("", np.array([whole.begin, whole.end]), np.full(2, np.nan), GREY, legend=False)
-    strip = Panel(
-        "",
-        (ends, *span_names(spans, whole)),
-        categories=("status",),
-        height=0.22,
-        fills=tuple(fills),
-    )
+    names = (ends, *span_names(spans, whole))
+    strip = Panel("", names, categories=("status",), height=0.22, fills=tuple(fills))
     bound = table["bound"].to_numpy(dtype=np.float64)
     carried = np.where(np.isfinite(table["carried"]), table["carried"], heading.rejected_beyond)
     # Decades from below the smallest bound up to a practically unknown heading.
-    known = (
-        min(float(np.nanmin(bound)), heading.trusted_below)
-        if np.isfinite(bound).any()
-        else heading.trusted_below
-    )
+    known = heading.trusted_below
+    if np.isfinite(bound).any():
+        known = min(float(np.nanmin(bound)), known)
     shown = [
         ("bound of the run (95 %)", bound, BLUE, "solid", 1.6),
         ("bound by an independent check (99 %)", carried, BLACK, "solid", 2.0),
     ]
     error = heading_error(result, time)
     if error is not None:
-        shown.append(
-            (f"error against {result.source.truth_name}", np.abs(error), VERMILLION, "dot", 1.4)
-        )
+        size = np.abs(error)
+        shown.append((f"error against {result.source.truth_name}", size, VERMILLION, "dot", 1.4))
         if np.isfinite(error).any():
-            known = min(known, max(float(np.nanmedian(np.abs(error))), 1e-3))
+            known = min(known, max(float(np.nanmedian(size)), 1e-3))
     least = 10.0 ** math.floor(math.log10(max(known, 1e-4)))
-    lines = tuple(
-        curve(
-            name,
-            time,
-            np.clip(values, least, heading.rejected_beyond),
-            colour,
-            dash,
-            width,
-            BUCKETS,
-        )
-        for name, values, colour, dash, width in shown
-    )
+    lines = []
+    for name, values, colour, dash, width in shown:
+        values = np.clip(values, least, heading.rejected_beyond)
+        lines.append(curve(name, time, values, colour, dash, width, BUCKETS))
     limit = f"{plain(heading.trusted_below, 1)}°"
+    levels = (Level(heading.trusted_below, limit),)
     return Chart(
         "heading-integrity",
         "Heading integrity",
         f"Above: status. Below: its bounds; trusted requires both below {limit} (dashed). A curve "
         "at the top is unknown.",
         "time, s",
-        (
-            strip,
-            Panel("heading, deg", lines, log=True, levels=(Level(heading.trusted_below, limit),)),
-        ),
+        (strip, Panel("heading, deg", tuple(lines), log=True, levels=levels)),
     )
 
 
@@ -622,28 +564,21 @@ def repeated_chart(result: NavigationRun) -> Chart | None:
     repeated = result.trust.repeated
     if repeated is None or repeated.differences is None or repeated.record is None:
         return None
-    table = repeated.differences
-    time = index_of(table)
+    time = index_of(repeated.differences)
     if len(time) < 2:
         return None
-    place = np.hypot(table["north"].to_numpy(), table["east"].to_numpy())
-    turn = np.abs(table["heading"].to_numpy(dtype=np.float64))
-    both = (result.filtered, repeated.record)
+    place, turn = apart(repeated.differences)
     panels = []
-    for label, difference, bounds in (
-        ("position, m", place, [plane_bound(r.covariance) for r in both]),
-        (
-            "heading, deg",
-            turn,
-            [TWO_SIDED_95 * r.sd["heading"].to_numpy(dtype=np.float64) for r in both],
-        ),
-    ):
+    for label, difference in (("position, m", place), ("heading, deg", turn)):
         lines = []
         tall = 0.0
-        for name, record, values, look in (
-            ("bound of the run (95 %)", both[0], bounds[0], (BLUE, "solid", 1.6)),
-            ("bound of the re-run (95 %)", both[1], bounds[1], (GREY, "dash", 1.4)),
+        for name, record, look in (
+            ("bound of the run (95 %)", result.filtered, (BLUE, "solid", 1.6)),
+            ("bound of the re-run (95 %)", repeated.record, (GREY, "dash", 1.4)),
         ):
+            values = plane_bound(record.covariance)
+            if difference is turn:
+                values = TWO_SIDED_95 * record.sd["heading"].to_numpy(dtype=np.float64)
             at = index_of(record.sd)
             within = (at >= time[0]) & (at <= time[-1])
             lines.append((name, at[within], values[within], look))
@@ -652,7 +587,7 @@ def repeated_chart(result: NavigationRun) -> Chart | None:
         # The bounds of a start, and those of an outage, would hide the rest.
         most = max(1.15 * tall, 1.02 * float(np.nanmax(difference)), 1e-6)
         lines.append(("difference", time, difference, (VERMILLION, "solid", 2.0)))
-        zero = Line("", time[[0, -1]], np.zeros(2), GREY, points=True, size=0.0, legend=False)
+        zero = dots("", time[[0, -1]], np.zeros(2), GREY, size=0.0, legend=False)
         drawn = [
             curve(name, at, np.minimum(values, most), *look, buckets=BUCKETS)
             for name, at, values, look in lines

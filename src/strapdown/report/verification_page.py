@@ -7,15 +7,14 @@ from pathlib import Path
 
 from strapdown import __version__
 from strapdown.bundle import environment, read_manifest
-from strapdown.errors import Finding
 from strapdown.report.document import (
     Block,
     Document,
     Facts,
-    Items,
     Paragraph,
-    TableBlock,
+    items_of,
     section,
+    table_of,
 )
 from strapdown.report.document_html import document_page
 from strapdown.report.verify import Verification, conditions_of
@@ -67,7 +66,7 @@ def verification_page(
         ("Verified with", f"strapdown {__version__}"),
     )
     answer = _MEANING[result.verdict].format(within=result.within)
-    front: tuple[Block, ...] = (
+    front = (
         Paragraph(f"{result.verdict.capitalize()}. {answer}", "lead"),
         Paragraph(_of_seal(seal, signer), "note"),
     )
@@ -80,33 +79,33 @@ def verification_page(
         for item in manifest["inputs"]
     ]
     conditions = conditions_of(manifest)
+    differ = [(f.file or "", f.sentence()) for f in result.findings]
     document = Document(
         title=f"Verification of {root.name}",
         subtitle="A sealed result of strapdown, run again and compared",
         facts=facts,
         front=front,
         sections=(
-            section("findings", "Findings", _findings(result.findings)),
+            section("findings", "Findings", items_of(differ) or Paragraph("Nothing differs.")),
             section(
                 "outputs",
                 "Results",
-                TableBlock(("file", "compared", "bytes", "SHA-256"), tuple(rows), text=(0, 1, 3)),
+                table_of("file | compared | bytes | SHA-256", rows, text=(0, 1, 3)),
             ),
             section(
                 "inputs",
                 "Inputs",
-                TableBlock(("role", "file", "bytes", "SHA-256"), tuple(inputs), text=(0, 1, 3))
-                if inputs
-                else Paragraph("None: the run is of a simulation."),
+                table_of("role | file | bytes | SHA-256", inputs, text=(0, 1, 3))
+                or Paragraph("None: the run is of a simulation."),
             ),
             section(
                 "conditions",
                 "Versions and platform",
-                TableBlock(
-                    ("", "when it was sealed", "now"),
-                    tuple((name, *pair) for name, pair in conditions.items()),
+                table_of(
+                    "| when it was sealed | now",
+                    ((name, *pair) for name, pair in conditions.items()),
                     text=(0, 1, 2),
-                    strong=tuple(k for k, (a, b) in enumerate(conditions.values()) if a != b),
+                    strong=(k for k, (a, b) in enumerate(conditions.values()) if a != b),
                 ),
             ),
             section("repeat", "To repeat this", *_how(root.name, manifest["environment"])),
@@ -135,12 +134,6 @@ def _outcome(result: Verification, compared: dict[str, str], name: str) -> str:
         return next(f.sentence() for f in result.findings if f.file == name)
     code = compared.get(name)
     return "as sealed; not repeated" if code is None else _RESULT.get(code, code)
-
-
-def _findings(found: tuple[Finding, ...]) -> Block:
-    if not found:
-        return Paragraph("Nothing differs.")
-    return Items(tuple((f.file or "", f.sentence()) for f in found))
 
 
 def _how(name: str, packages: list[str]) -> Iterator[Block]:

@@ -239,11 +239,9 @@ def _beside_the_seal(root: Path, signer: str | Path | None) -> list[Finding]:
             raise
         return [Finding("verify.signatures-unchecked", severity="note", reason=error.finding)]
     for one in signed:
-        data: dict[str, Any] = {"file": one.file, "signer": one.signer}
-        if one.valid:
-            found.append(Finding("verify.signed", severity="note", **data))
-        else:
-            found.append(Finding("verify.signature-wrong", severity="error", **data))
+        code = "verify.signed" if one.valid else "verify.signature-wrong"
+        severity: Severity = "note" if one.valid else "error"
+        found.append(Finding(code, severity=severity, file=one.file, signer=one.signer))
     if wanted is not None and not any(one.valid and one.signer == wanted for one in signed):
         found.append(Finding("verify.not-signed", severity="error", signer=wanted))
     if (root / TIMESTAMP).is_file():
@@ -398,27 +396,14 @@ def _other_environment(manifest: dict[str, Any]) -> list[Finding]:
 def changed_case(root: Path, manifest: dict[str, Any]) -> list[Finding]:
     """Name the options in which a bundle's case file and its sealed configuration differ.
 
-    Parameters
-    ----------
-    root : Path
-        The bundle.
-    manifest : dict
-        From `read_manifest`.
-
-    Returns
-    -------
-    list of Finding
-        One per option, with the sealed value first; empty if both agree, or if the bundle is not of
-        a crash.
+    One finding per option, with the sealed value first; empty if both agree, or if the bundle is
+    not of a crash.
     """
     configuration = manifest["configuration"]
     if manifest["command"] != "crash" or not isinstance(configuration, dict):
         return []
     name = configuration.get("case_path")
-    if not isinstance(name, str):
-        return []
-    path = root / name
-    if not path.is_file():
+    if not isinstance(name, str) or not (path := root / name).is_file():
         return []
     try:
         stated = CaseSpec.read(path, files=False).model_dump(mode="json", exclude_none=True)
