@@ -216,14 +216,16 @@ def relinearized(
 
 
 def starts_far(record: NavigationRecord, sensors: ImuUncertainty) -> bool:
-    """Return whether navigation begins with a tilt that is too large for a linear filter.
+    """Return whether navigation begins with an attitude too uncertain for a linear filter.
 
     The filter then takes its corrections for knowledge: what is observed before and after them is
     of different trajectories, and the tilt against the bias that hides it seems to be observed
-    (Huang, Mourikis and Roumeliotis, Int. J. Robotics Research 29 (2010) 502). Gravity along the
-    vertical axis changes by ``g (x² + y²)/2`` with the tilts x and y, of covariance T: its variance
-    ``g² tr(T²)/2`` counts beside that of the accelerometers from a tenth of it on. A tilt by their
-    biases alone, of less than a third of g, never counts.
+    (Huang, Mourikis and Roumeliotis, Int. J. Robotics Research 29 (2010) 502). A correction of the
+    tilts x and y changes gravity along the vertical axis by ``g (x² + y²)/2``, and one of the
+    heading z turns a tilt away from its bias, ``g x z`` and ``g y z``. Their variance
+    ``g² (tr(T²)/2 + tr(T) H)``, with the covariance T of the tilts and the variance H of the
+    heading, counts beside that of the accelerometers from a tenth of it on. Of a tilt by their
+    biases alone that is a heading unknown by 13 deg.
 
     Parameters
     ----------
@@ -231,11 +233,12 @@ def starts_far(record: NavigationRecord, sensors: ImuUncertainty) -> bool:
         Of the filter.
     sensors : ImuUncertainty
     """
-    tilt = record.covariance[0][6:8, 6:8]
+    P = record.covariance[0]
+    tilt, heading = P[6:8, 6:8], float(P[8, 8])
     force = np.array([0.0, 0.0, -STANDARD_GRAVITY])
     known = sensors.accel_bias_variance() + sensors.accel.variance_by_input(force)
-    second = 0.5 * STANDARD_GRAVITY**2 * float(np.sum(tilt * tilt))
-    return second > COUNTS * float(known.mean())
+    second = 0.5 * float(np.sum(tilt * tilt)) + float(np.trace(tilt)) * heading
+    return STANDARD_GRAVITY**2 * second > COUNTS * float(known.mean())
 
 
 def run_by_sample(

@@ -165,19 +165,22 @@ def test_a_filter_that_starts_far_off_does_not_take_its_corrections_for_knowledg
     np.testing.assert_allclose(again.sd.iloc[0], once.sd.iloc[0], rtol=0.1)
 
 
-def test_a_start_is_far_off_by_its_tilt_beside_the_biases_of_the_accelerometers():
+@pytest.mark.parametrize("heading", [0.0, HEADING])
+def test_a_start_is_far_off_by_its_attitude_beside_the_biases_of_the_accelerometers(heading):
     record = filtered(1)[0]
+    covariance = record.covariance.copy()
+    covariance[0, 8, 8] = heading**2
+    record = replace(record, covariance=covariance)
     gyro = TriadUncertainty(bias=GYRO_BIAS, noise_density=GYRO_NOISE)
 
     def far(bias):
-        return starts_far(
-            record, ImuUncertainty(gyro, TriadUncertainty(bias=bias, noise_density=1e-3))
-        )
+        accel = TriadUncertainty(bias=bias, noise_density=ACCEL_NOISE)
+        return starts_far(record, ImuUncertainty(gyro, accel))
 
-    # Of two tilts of the same sd the second order is g sd²; a tenth of a variance is its root.
-    limit = 9.80665 * TILT**2 / math.sqrt(0.1)
-    assert far(0.9 * limit)
-    assert not far(1.1 * limit)
+    # Of two tilts of one sd the second orders are g sd² and, in both directions, g sd heading sd.
+    limit = 9.80665 * TILT * math.sqrt((TILT**2 + 2.0 * heading**2) / 0.1)
+    assert far(0.98 * limit)
+    assert not far(1.02 * limit)
 
 
 @pytest.mark.slow
