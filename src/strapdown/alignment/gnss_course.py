@@ -50,7 +50,7 @@ from strapdown.earth import transport_rate
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.estimation.robust import Huber, Igg3, Influence
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
-from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import FREEDOM, ImuUncertainty
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, usable
 from strapdown.tables.checks import is_number, source_of
 
@@ -214,8 +214,8 @@ UNKNOWN_PLACE = 1e4
 LEAST_FREE = 12.0
 # Number of updates of weights and scale with one linearization.
 SWEEPS = 3
-# Degrees of freedom of the biases of the units of a type, and a factor that counts as one.
-FREEDOM, NEAR = 4.0, 1.05
+# A factor of the biases that counts as one.
+NEAR = 1.05
 # Share of the weight of fixes and rests in a state from which a filter meets them again.
 ONCE = 0.1
 # Number of first positions, the first of which to agree with the others gives the position.

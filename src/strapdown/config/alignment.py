@@ -86,6 +86,8 @@ class SensorsTable(Spec):
     )
     gyro: dict[Word, OneOrThree] = Field(default_factory=dict)
     accel: dict[Word, OneOrThree] = Field(default_factory=dict)
+    #: Factor on the standard deviations by which units of the sensor's type differ.
+    unit_factor: Positive = 1.0
 
 
 class CoarseSpec(ChoiceSpec):
@@ -206,9 +208,11 @@ def sensors_of(spec: Any) -> ImuUncertainty:
     sensor = None if stated.sensor is None else load_sensor(stated.sensor)
     log = getattr(spec, "log", None)
     if log is None or log.calibration is None:
-        return stated_imu(sensor, stated.gyro, stated.accel)
+        return stated_imu(sensor, stated.gyro, stated.accel, unit_factor=stated.unit_factor)
     known = _axes_of(SensorCalibration.read(log.calibration), spec.axes)
-    return stated_imu(sensor, stated.gyro, stated.accel, known.uncertainty)
+    return stated_imu(
+        sensor, stated.gyro, stated.accel, known.uncertainty, unit_factor=stated.unit_factor
+    )
 
 
 def _axes_of(calibration: SensorCalibration, axes: AxesTable) -> SensorCalibration:

@@ -20,6 +20,7 @@ from strapdown.alignment.levelling import BLOCKS, turn_variance
 from strapdown.alignment.mean_errors import block_means, excursion
 from strapdown.constants import MAD_TO_SD
 from strapdown.dsp.samples import running_integral
+from strapdown.earth import gravity
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import DataError
 from strapdown.estimation.error_filter import ErrorFilter, FilterState, symmetric
@@ -39,7 +40,7 @@ from strapdown.navigation.modes import Aligned, CoarseMode, FineMode
 from strapdown.prefilter.prefilter import CHANNELS
 from strapdown.rotation import rotate
 from strapdown.sensors.rest import sd_of_mean
-from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import FREEDOM, ImuUncertainty
 from strapdown.tables import (
     ACCEL,
     GEODETIC,
@@ -415,14 +416,15 @@ def from_alignment(
     FilterState
         If the alignment does not estimate biases, its tilt is correlated with the accelerometer
         errors at rest (`_levelled`). If they were independent, the first zero-velocity update
-        would take each to confirm the other, and both covariances would become too small.
+        would take each to confirm the other, and both covariances would become too small. Both
+        are inflated where the magnitude of the specific force contradicts gravity (`_of_unit`).
     """
     whole = np.zeros((PHYSICAL, PHYSICAL))
     whole[:6, :6] = P
     whole[6:9, 6:9] = found.covariance
     start = replace(start, time=found.time, q_nb=found.q_nb)
     if found.gyro_bias is None or found.accel_bias is None:
-        P = _levelled(filter_, whole, found.q_nb, rest)
+        P = _levelled(filter_, whole, start, rest)
         return filter_.begin(start, _added(P, by_others))
     assert found.gyro_bias_sd is not None and found.accel_bias_sd is not None
     told = np.concatenate([found.gyro_bias, found.accel_bias])
@@ -511,7 +513,7 @@ def _with_sensors(filter_: ErrorFilter, P: Array) -> Array:
     return out
 
 
-def _levelled(filter_: ErrorFilter, P: Array, q_nb: Array, rest: Array) -> Array:
+def _levelled(filter_: ErrorFilter, P: Array, start: NavState, rest: Array) -> Array:
     """Covariance of all physical errors after leveling by accelerometers.
 
     Accelerometer errors at rest, ``e = A x`` of the states x, tilt the measured gravity by
@@ -521,16 +523,40 @@ def _levelled(filter_: ErrorFilter, P: Array, q_nb: Array, rest: Array) -> Array
     """
     out = _with_sensors(filter_, P)
     P0 = out[PHYSICAL:, PHYSICAL:]
-    north_east = rotation.dcm_from_quaternion(q_nb)[:2] / float(np.linalg.norm(rest[3:]))
-    T = np.array([[0.0, -1.0], [1.0, 0.0]]) @ north_east @ _read_at_rest(filter_, rest)[3:]
+    size = float(np.linalg.norm(rest[3:]))
+    north_east = rotation.dcm_from_quaternion(start.q_nb)[:2] / size
+    A = _read_at_rest(filter_, rest)[3:]
+    T = np.array([[0.0, -1.0], [1.0, 0.0]]) @ north_east @ A
     attitude = P[6:9, 6:9]
+    by_tilt = attitude[:, :2] @ np.linalg.inv(attitude[:2, :2])
+    stated = T @ P0 @ T.T
+    moved = size**2 * max(0.5 * float(np.trace(attitude[:2, :2] - stated)), 0.0)
+    up = rest[3:] / size @ A
+    ellipsoid = find_ellipsoid(filter_.mechanization.ellipsoid)
+    g = gravity(math.degrees(start.lat), start.alt, ellipsoid=ellipsoid)
+    wider = _of_unit(size - float(np.linalg.norm(g)), float(up @ P0 @ up) + moved)
+    attitude = attitude + (wider - 1.0) * by_tilt @ stated @ by_tilt.T
+    D = np.where(A.any(axis=0), math.sqrt(wider), 1.0)
+    P0 = D[:, None] * P0 * D
     root = np.linalg.cholesky(attitude[:2, :2])
     own = np.linalg.solve(root, T @ np.sqrt(P0))
     part = min(1.0, 1.0 / max(float(np.linalg.norm(own, 2)), 1e-300))
-    by_tilt = attitude[:, :2] @ np.linalg.inv(attitude[:2, :2])
+    out[6:9, 6:9], out[PHYSICAL:, PHYSICAL:] = attitude, P0
     out[6:9, PHYSICAL:] = part * by_tilt @ T @ P0
     out[PHYSICAL:, 6:9] = out[6:9, PHYSICAL:].T
     return symmetric(out)
+
+
+def _of_unit(excess: float, variance: float) -> float:
+    """Factor on the variances of accelerometers by their error along the vertical; at least 1.
+
+    `excess` (m/s²): magnitude of the specific force minus gravity. `variance`: stated. The errors
+    of the units of a type have Student's t distribution of `FREEDOM`: a unit that lies far outside
+    along the vertical is likely to along the horizontal, too, where its error is a tilt.
+    """
+    if not variance > 0.0:
+        return 1.0
+    return max(1.0, (FREEDOM + excess**2 / variance) / (FREEDOM + 1.0))
 
 
 def _with_biases(

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DivergenceError
 from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.modes import Aligned, PipelineChunk
@@ -19,6 +20,7 @@ from strapdown.navigation.record import Event, NavigationRecord, Span
 from strapdown.navigation.recorder import FullRecorder, Recorder
 from strapdown.navigation.smoother import Smoothing
 from strapdown.progress import Progress, silent
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO, check_imu, on_disk
 from strapdown.tables.checks import check_columns, source_of, values_of
 
@@ -38,6 +40,8 @@ Array = NDArray[np.float64]
 #: Length of a chunk of a record, s.
 CHUNK = 60.0
 CHANNELS = [*GYRO, *ACCEL]
+#: Share of a variance from which on what is neglected counts.
+COUNTS = 0.1
 #: Change of smoothed states, in standard deviations, at which passes end: of the change by the next
 #: one it is of second order.
 SETTLED = 0.1
@@ -163,6 +167,8 @@ def relinearized(
     run: PipelineRun,
     progress: Progress = silent,
     chunk: float = CHUNK,
+    *,
+    filtered: bool = False,
 ) -> PipelineRun:
     """Repeat a smoothed run about its smoothed states, until these stay where they are.
 
@@ -172,12 +178,14 @@ def relinearized(
         As `run_batch`.
     run : PipelineRun
         Of this pipeline over this record.
+    filtered : bool
+        The filter's solution is that of the last pass, too, as `starts_far` wants it.
 
     Returns
     -------
     PipelineRun
-        With another smoothed solution; what the filter found remains. A pass that diverges, or
-        moves farther than the one before, ends it: its result is not used.
+        With another smoothed solution; otherwise what the filter found remains. A pass that
+        diverges, or moves farther than the one before, ends it: its result is not used.
     """
     smoother, moved = chain.navigator.smoother, math.inf
     for _ in range(smoother.passes - 1 if smoother is not None else 0):
@@ -198,10 +206,39 @@ def relinearized(
         own = replace(found.smoothed, innovations=run.smoothed.innovations)
         on_disk.tidy()
         own = replace(own, events=run.smoothed.events, outages=run.smoothed.outages)
-        run = replace(run, smoothed=own, smoothing=found.smoothing, moved=moved)
+        record = run.record
+        if filtered:
+            record = replace(found.record, events=record.events, outages=record.outages)
+        run = replace(run, record=record, smoothed=own, smoothing=found.smoothing, moved=moved)
         if moved < SETTLED:
             return run
     return run
+
+
+def starts_far(record: NavigationRecord, sensors: ImuUncertainty) -> bool:
+    """Return whether navigation begins with an attitude too uncertain for a linear filter.
+
+    The filter then takes its corrections for knowledge: what is observed before and after them is
+    of different trajectories, and the tilt against the bias that hides it seems to be observed
+    (Huang, Mourikis and Roumeliotis, Int. J. Robotics Research 29 (2010) 502). A correction of the
+    tilts x and y changes gravity along the vertical axis by ``g (x² + y²)/2``, and one of the
+    heading z turns a tilt away from its bias, ``g x z`` and ``g y z``. Their variance
+    ``g² (tr(T²)/2 + tr(T) H)``, with the covariance T of the tilts and the variance H of the
+    heading, counts beside that of the accelerometers from a tenth of it on. Of a tilt by their
+    biases alone that is a heading unknown by 13 deg.
+
+    Parameters
+    ----------
+    record : NavigationRecord
+        Of the filter.
+    sensors : ImuUncertainty
+    """
+    P = record.covariance[0]
+    tilt, heading = P[6:8, 6:8], float(P[8, 8])
+    force = np.array([0.0, 0.0, -STANDARD_GRAVITY])
+    known = sensors.accel_bias_variance() + sensors.accel.variance_by_input(force)
+    second = 0.5 * float(np.sum(tilt * tilt)) + float(np.trace(tilt)) * heading
+    return STANDARD_GRAVITY**2 * second > COUNTS * float(known.mean())
 
 
 def run_by_sample(

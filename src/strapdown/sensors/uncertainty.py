@@ -346,6 +346,12 @@ def _scaled(given: Stated, factor: float, quantity: str) -> Stated:
 
 # Uncertainty of gyros and accelerometers together: a data sheet with overrides.
 
+#: Degrees of freedom of Student's t distribution of the errors of the units of a type, and the
+#: standard deviation of that distribution in units of the stated one. A maker measures units before
+#: they are soldered, aged and warm, and some lie far outside. Its bound of 95 % is wider than a
+#: normal one by the same factor, to 0.2 %.
+FREEDOM = 4.0
+UNIT_FACTOR = math.sqrt(FREEDOM / (FREEDOM - 2.0))
 DRIFT = ("bias_instability", "correlation_time", "random_walk")
 
 _NEEDED = {"bias": "bias_sd", "noise_density": "noise_density"}
@@ -356,11 +362,14 @@ def stated_imu(
     gyro: Mapping[str, Stated],
     accel: Mapping[str, Stated],
     calibrated: Callable[[ImuUncertainty], ImuUncertainty] | None = None,
+    unit_factor: float = 1.0,
 ) -> ImuUncertainty:
     """Combine a catalogue sensor and stated values into an uncertainty.
 
     `sensor`: supplies the values that are not stated. `gyro`, `accel`: by catalogue key: one
     number, or three. `calibrated`: replaces what a calibration knows, unless it is stated.
+    `unit_factor`: on the sensor's standard deviations of what differs from unit to unit
+    (`SPREADS`); `UNIT_FACTOR` for a unit of which the type is all that is known.
     ConfigError: a key is unknown, a value is not a number, or bias or noise of a
     triad is neither stated nor in the data sheet. Zero instead would give the bounds of a perfect
     sensor.
@@ -374,11 +383,12 @@ def stated_imu(
         }
         fixed = {k: v for k, v in stated.items() if k not in slow}
         try:
-            triads[triad] = stated_uncertainty(triad, fixed, sensor)
+            known_triad = stated_uncertainty(triad, fixed, sensor)
         except ConfigError as error:
             # Name the triad itself in the finding.
             place = (error.finding.quantity or "").replace("uncertainty", triad)
             raise error.replaced(quantity=place) from None
+        triads[triad] = _of_unit(known_triad, unit_factor, [KEYS[triad][k].quantity for k in fixed])
         drifts[triad] = _stated_drift(
             triad, slow, None if base is None else getattr(base, f"{triad}_drift")
         )
@@ -392,6 +402,13 @@ def stated_imu(
     for triad in triads:
         _require(triad, getattr(out, triad))
     return out
+
+
+def _of_unit(triad: TriadUncertainty, factor: float, stated: Sequence[str]) -> TriadUncertainty:
+    """Uncertainty of a unit, with a factor on what is not `stated` of its type."""
+    names = [name for quantity, name in SPREADS.items() if quantity not in stated]
+    wider = {name: tuple(factor * x for x in triad.axis(name)) for name in names}
+    return replace(triad, **wider)  # type: ignore[arg-type]
 
 
 def _stated_drift(triad: str, stated: Mapping[str, Stated], base: BiasDrift | None) -> BiasDrift:

@@ -279,6 +279,14 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         )
         remark = "assumed: the grade, by its noise; name yours" if made.guessed else ""
         page.key("sensor", string(named), remark, check=check)
+        factor = made.table["sensors"].get("unit_factor")
+        if factor is not None:
+            page.say(
+                "Factor on biases, scale factors, misalignments and g-sensitivity of this sensor: "
+                "95 % of units lie within these bounds of Student's t (4 degrees of freedom), not "
+                "within those of the data sheet. 1 if yours has been tested to lie within them."
+            )
+            page.key("unit_factor", repr(factor))
     page.say(
         f"The catalogue (strapdown sensors): {', '.join(s.name for s in _whole())}; or a .toml "
         "file of your own. Alternatively, or to replace single values: tables [sensors.gyro] "

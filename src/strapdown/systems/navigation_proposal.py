@@ -52,7 +52,12 @@ from strapdown.navigation.navigator import Warming
 from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
 from strapdown.sensors.rest import LEAST_LENGTH, find_rests_of_every_grade
-from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty, stated_imu
+from strapdown.sensors.uncertainty import (
+    UNIT_FACTOR,
+    ImuUncertainty,
+    TriadUncertainty,
+    stated_imu,
+)
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.navigation_checks import ARM_SD
 from strapdown.systems.one_thread import one_thread
@@ -330,8 +335,12 @@ def propose(
 def _stated(table: dict[str, Any]) -> ImuUncertainty:
     """Uncertainty of the sensors in a proposed table."""
     stated = table["sensors"]
-    sensor = load_sensor(stated["sensor"])
-    return stated_imu(sensor, stated.get("gyro", {}), stated.get("accel", {}))
+    return stated_imu(
+        load_sensor(stated["sensor"]),
+        stated.get("gyro", {}),
+        stated.get("accel", {}),
+        unit_factor=stated.get("unit_factor", 1.0),
+    )
 
 
 def _corrected(gnss: FixesTable, step: ClockStep, moved: float) -> FixesTable:
@@ -383,8 +392,10 @@ def _sensors(
     `scatter`: as of `_scatter`. `bias`: of the gyros by a rest, as of `_rest_bias`. The noise is
     measured where it exceeds the data sheet's; of a grade it always is.
     """
-    out: dict[str, Any] = {"sensor": named}
+    # The figures of a grade are those of all units of all its types.
+    out: dict[str, Any] = {"sensor": named, "unit_factor": round(UNIT_FACTOR, 2)}
     if named is None:
+        del out["unit_factor"]
         assert scatter is not None
         out["sensor"] = next(name for name, most in NOISE_OF_GRADES if min(scatter[0][0]) < most)
     known = ImuUncertainty.of_sensor(load_sensor(out["sensor"]))

@@ -59,7 +59,8 @@ from strapdown.navigation.preprocessing import GapPolicy, ImuPreprocessor, ends_
 from strapdown.navigation.record import NavigationRecord, Span, innovation_labels
 from strapdown.navigation.recorder import IntervalRecorder, Recorder
 from strapdown.navigation.recovery import longest, wrong_stretches
-from strapdown.navigation.replay import PipelineRun, relinearized, run_batch
+from strapdown.navigation.replay import PipelineRun, relinearized, run_batch, starts_far
+from strapdown.navigation.smoother import RauchTungStriebel
 from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
@@ -196,14 +197,13 @@ def run_navigation(
         begun_with = replace(
             begun_with, navigator=replace(begun_with.navigator, wrong=chain.navigator.wrong)
         )
-        if run.smoothed is not None:
+        far = starts_far(run.record, sensors)
+        if run.smoothed is not None or (far and chain.navigator.damping.feeds_back):
 
             def show_pass(mode: str, share: float) -> None:
                 progress(f"smoothing: {mode}", ENDED)
 
-            run = relinearized(
-                chain, source.imu, source.tables, recorder, run, show_pass, chunk=CHUNK
-            )
+            run = _about_smoothed(chain, source, recorder, run, far, show_pass)
     if any(finding.code == UNSTATED for finding in source.findings):
         late = 0.5 * float(np.median(np.diff(index_of(source.imu))))
         smoothed = None if run.smoothed is None else with_late_samples(run.smoothed, late)
@@ -447,6 +447,32 @@ def _recovered(
             ),
         )
     return chain, run, findings
+
+
+def _about_smoothed(
+    chain: NavigationPipeline,
+    source: NavigationSource,
+    recorder: Recorder,
+    run: PipelineRun,
+    far: bool,
+    progress: Progress,
+) -> PipelineRun:
+    """Repeat a run about its smoothed states, and of one that starts `far` the filter as well.
+
+    Without a smoother, of which the filter alone is a result, there is none afterwards either.
+    """
+    again, smooths = run, run.smoothed is not None
+    if not smooths:
+        navigator = replace(chain.navigator, smoother=RauchTungStriebel())
+        chain = replace(chain, navigator=navigator)
+        try:
+            again = run_batch(chain, source.imu, source.tables, recorder, progress, CHUNK)
+        except DivergenceError:
+            return run
+    again = relinearized(
+        chain, source.imu, source.tables, recorder, again, progress, CHUNK, filtered=far
+    )
+    return again if smooths else replace(run, record=again.record)
 
 
 def _known_offset(aid: Gnss, error: pd.Series, sd: pd.Series) -> tuple[float, float] | None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tests.coded import coded
 
 from strapdown.config import navigation as tables
+from strapdown.config.alignment import sensors_of
 from strapdown.config.choice import SLOTS, options_of
 from strapdown.config.navigation import STAGES, NavigationSpec
 from strapdown.config.spec import Spec
@@ -150,3 +152,12 @@ def test_options_have_the_units_of_their_fields():
     for kind, entry in SLOTS["aiding"].entries.items():
         for option in options_of(entry):
             assert option.key in plain or option.key.endswith(endings), (kind, option.key)
+
+
+def test_units_differ_by_more_than_their_type_states(tmp_path):
+    sheet = sensors_of(read(tmp_path, FILE))
+    text = FILE.replace('sensor = "stim300"', 'sensor = "stim300"\nunit_factor = 1.5')
+    wider = sensors_of(read(tmp_path, text))
+    for name in ("bias", "scale", "misalignment"):
+        assert wider.gyro.axis(name) == pytest.approx(1.5 * np.array(sheet.gyro.axis(name)))
+    assert wider.gyro.noise_density == sheet.gyro.noise_density

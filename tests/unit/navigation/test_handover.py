@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment, Site
@@ -204,6 +205,67 @@ def test_a_levelled_tilt_goes_with_the_accelerometers_that_made_it(method):
     assert left == pytest.approx(0.0, abs=0.03 * ACCEL_SD)
     assert np.sqrt(np.diagonal(P))[6:8] * 9.81 == pytest.approx(ACCEL_SD, rel=0.01)
     assert np.linalg.eigvalsh(P[6:15, 6:15]).min() > -1e-12
+
+
+def levelled(bias, tilt=(0.0, 0.0), more=(), scatter=0.0):
+    """State and covariance after leveling with these biases, m/s², body axes."""
+    filter_ = made(more=more)
+    C = rotation.dcm_from_quaternion(rotation.quaternion_from_euler([*tilt, 70.0]))
+    force = -C.T @ SITE.gravity + np.asarray(bias)
+    roll, pitch = rotation.level(force)
+    sd = math.hypot(ACCEL_SD, scatter) / 9.81
+    found = Alignment(
+        method="known_heading",
+        time=0.0,
+        q_nb=rotation.quaternion_from_euler([roll, pitch, 70.0]),
+        covariance=np.diag(np.square([sd, sd, 0.02])),
+        heading_given=True,
+    )
+    start = NavState.from_degrees(*HERE, time=0.0)
+    rest = np.r_[np.zeros(3), force]
+    return filter_, in_ned(filter_, from_alignment(filter_, found, start, np.eye(6), rest))
+
+
+def test_a_force_that_contradicts_gravity_widens_the_tilt_with_the_biases():
+    _, as_stated = levelled((0.0, 0.0, 0.5 * ACCEL_SD))
+    _, P = levelled((0.0, 0.0, 6.0 * ACCEL_SD))
+    # Student's t of four degrees of freedom, one error of six standard deviations: (4 + 36) / 5.
+    wider = np.diagonal(P) / np.diagonal(as_stated)
+    assert wider[6:8] == pytest.approx(8.0, rel=0.01)
+    assert wider[PHYSICAL + 3 : PHYSICAL + 6] == pytest.approx(8.0, rel=0.01)
+    assert wider[PHYSICAL : PHYSICAL + 3] == pytest.approx(1.0)
+    assert wider[:6] == pytest.approx(1.0)
+    # Of a level body the heading does not depend on the tilt.
+    assert wider[8] == pytest.approx(1.0)
+    sd = np.sqrt(np.diagonal(as_stated))
+    assert sd[6:8] * 9.81 == pytest.approx(ACCEL_SD, rel=0.01)
+    assert sd[PHYSICAL + 3 :] == pytest.approx(ACCEL_SD)
+    # Tilt and bias are as correlated as before.
+    assert P[7, PHYSICAL + 3] / as_stated[7, PHYSICAL + 3] == pytest.approx(8.0, rel=0.01)
+
+
+def test_a_force_of_a_moving_hand_does_not_blame_the_accelerometers():
+    # The mean force of a body that is not at rest is off by about its effect on the tilt.
+    shaken = 20.0 * ACCEL_SD
+    _, as_stated = levelled((0.0, 0.0, 0.0), scatter=shaken)
+    _, P = levelled((0.0, 0.0, 20.0 * ACCEL_SD), scatter=shaken)
+    assert np.diagonal(P) == pytest.approx(np.diagonal(as_stated), rel=1e-4)
+
+
+def test_tilts_of_units_far_outside_of_their_type_are_inside_more_often():
+    # Biases of the units of a type by Student's t, as large together as one draw of its scale.
+    draws, inside, before = 400, 0, 0
+    rng = np.random.default_rng(7)
+    for _ in range(draws):
+        scale = math.sqrt(4.0 / rng.chisquare(4.0))
+        bias = ACCEL_SD * scale * rng.normal(size=3)
+        _, P = levelled(bias)
+        tilt = bias[:2] / 9.81  # of a level body, in its own axes
+        inside += int(np.square(tilt).sum() < stats.chi2(2).ppf(0.95) * P[6, 6])
+        before += int(np.square(tilt).sum() < stats.chi2(2).ppf(0.95) * (ACCEL_SD / 9.81) ** 2)
+    # Without the evidence F(2, 4) is below 3.0: in 84 %; with the true scale 95 would be.
+    assert before / draws < 0.88
+    assert inside > before + 10
 
 
 @pytest.mark.parametrize("after", [0.0, 0.2, 1.5])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import mmap
 import sys
 from dataclasses import replace
@@ -28,9 +29,10 @@ from strapdown.navigation.modes import KnownStart
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.recorder import IntervalRecorder
-from strapdown.navigation.replay import SETTLED, relinearized, run_batch
+from strapdown.navigation.replay import SETTLED, relinearized, run_batch, starts_far
 from strapdown.navigation.smoother import RauchTungStriebel
 from strapdown.navigation.truth_comparison import smoother_consistency
+from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation import ImuErrors, Origin, PathMotion, Track, TriadErrors, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.tables import POSITION_SD, VELOCITY, on_disk
@@ -139,6 +141,46 @@ def test_what_the_filter_found_remains():
         assert again.smoothed.innovations[name] is table
     only = replace(chain.navigator, smoother=RauchTungStriebel(passes=1))
     assert relinearized(replace(chain, navigator=only), imu, tables, None, run) is run
+
+
+@cache
+def filtered(seed, share=1.0):
+    """What the filter finds of a walk at once, and about its smoothed states."""
+    chain, imu, tables = started(seed, share)
+    run = run_batch(chain, imu, tables, IntervalRecorder(rate_hz=5.0))
+    recorder = IntervalRecorder(rate_hz=5.0)
+    again = relinearized(chain, imu, tables, recorder, run, filtered=True)
+    return run.record, again.record
+
+
+def test_a_filter_that_starts_far_off_does_not_take_its_corrections_for_knowledge():
+    once, again = filtered(1)
+    # Errors of a hundredth leave the filter on the true path: what is known there is known.
+    there = np.trace(tilts(filtered(1, 0.01)[0])[1])
+    assert np.trace(tilts(again)[1]) == pytest.approx(there, rel=0.1)
+    assert np.trace(tilts(once)[1]) < 0.8 * there
+    assert again.sd.index.equals(once.sd.index)
+    assert again.trajectory.index.equals(once.trajectory.index)
+    # The filter knows at the begin what it was told, not what came later.
+    np.testing.assert_allclose(again.sd.iloc[0], once.sd.iloc[0], rtol=0.1)
+
+
+@pytest.mark.parametrize("heading", [0.0, HEADING])
+def test_a_start_is_far_off_by_its_attitude_beside_the_biases_of_the_accelerometers(heading):
+    record = filtered(1)[0]
+    covariance = record.covariance.copy()
+    covariance[0, 8, 8] = heading**2
+    record = replace(record, covariance=covariance)
+    gyro = TriadUncertainty(bias=GYRO_BIAS, noise_density=GYRO_NOISE)
+
+    def far(bias):
+        accel = TriadUncertainty(bias=bias, noise_density=ACCEL_NOISE)
+        return starts_far(record, ImuUncertainty(gyro, accel))
+
+    # Of two tilts of one sd the second orders are g sd² and, in both directions, g sd heading sd.
+    limit = 9.80665 * TILT * math.sqrt((TILT**2 + 2.0 * heading**2) / 0.1)
+    assert far(0.98 * limit)
+    assert not far(1.02 * limit)
 
 
 @pytest.mark.slow

@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
-from strapdown.sensors.uncertainty import ImuUncertainty, stated_imu
+from strapdown.sensors.uncertainty import FREEDOM, UNIT_FACTOR, ImuUncertainty, stated_imu
 
 DEG_H = math.radians(1.0) / 3600.0
 GYRO = {"bias_sd_deg_per_h": 0.01, "noise_density_deg_per_sqrt_h": 0.002}
@@ -19,6 +20,28 @@ ACCEL = {"bias_sd_ug": 50.0, "noise_density_ug_per_sqrt_hz": 10.0}
 def test_a_data_sheet_alone():
     sensor = load_sensor("fog-1000")
     assert stated_imu(sensor, {}, {}) == ImuUncertainty.of_sensor(sensor)
+
+
+def test_a_unit_differs_from_its_type_by_more_than_the_sheet_and_its_noise_does_not():
+    sensor = load_sensor("stim300")
+    sheet = ImuUncertainty.of_sensor(sensor)
+    made = stated_imu(sensor, {"scale_sd_ppm": 300.0}, {}, unit_factor=UNIT_FACTOR)
+    for triad in ("gyro", "accel"):
+        known, unit = getattr(sheet, triad), getattr(made, triad)
+        for name in ("bias", "misalignment", "g_sensitivity", "nonlinearity_2"):
+            assert unit.axis(name) == pytest.approx(UNIT_FACTOR * np.array(known.axis(name)))
+        for name in ("noise_density", "full_scale", "quantization", "bandwidth"):
+            assert getattr(unit, name) == getattr(known, name)
+    # A figure that is stated is the unit's own.
+    assert made.gyro.axis("scale") == pytest.approx([300e-6] * 3)
+    assert made.accel.axis("scale") == pytest.approx(UNIT_FACTOR * np.array(sheet.accel.scale))
+    assert (made.gyro_drift, made.accel_drift) == (sheet.gyro_drift, sheet.accel_drift)
+
+
+def test_the_factor_of_a_unit_is_that_of_the_bound_of_students_t():
+    by_bound = stats.t(FREEDOM).ppf(0.975) / stats.norm.ppf(0.975)
+    assert pytest.approx(by_bound, rel=2e-3) == UNIT_FACTOR
+    assert pytest.approx(stats.t(FREEDOM).std()) == UNIT_FACTOR
 
 
 def test_stated_alone():

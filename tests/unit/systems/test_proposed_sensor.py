@@ -11,7 +11,9 @@ from strapdown.config.logs import FixesTable, LogTable
 from strapdown.config.navigation import NavigationSpec
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
 from strapdown.frames import place_difference
+from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
+from strapdown.sensors.uncertainty import UNIT_FACTOR, ImuUncertainty
 from strapdown.simulation import Origin, car, simulate_imu
 from strapdown.simulation.earth_motion import StationaryMotion
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
@@ -57,6 +59,24 @@ def test_noise_beyond_the_data_sheet_is_stated_for_a_named_sensor_too():
     found = _sensors("hg9900", scatter(gyro, 48.0 / MICRO_G), None)
     assert "gyro" not in found
     assert found["accel"]["noise_density_ug_per_sqrt_hz"] == (48.0, 48.0, 48.0)
+
+
+def test_a_named_unit_may_lie_outside_of_its_type_and_a_grade_has_no_type():
+    quiet = scatter(1e-6, 1e-4)
+    assert _sensors("bmi160", quiet, None)["unit_factor"] == round(UNIT_FACTOR, 2)
+    assert _sensors("bmi160", None, None)["unit_factor"] == round(UNIT_FACTOR, 2)
+    assert "unit_factor" not in _sensors(None, quiet, None)
+
+
+def test_the_industrial_grade_is_as_wide_as_the_units_it_stands_for():
+    units = ("adis16448", "adis16470", "adis16505-1", "xsens-mti-1")
+    own = ImuUncertainty.of_sensor(load_sensor("industrial-grade"))
+    known = [ImuUncertainty.of_sensor(load_sensor(name)) for name in units]
+    for triad, name in (("gyro", "misalignment"), ("accel", "misalignment"), ("accel", "bias")):
+        sds = [getattr(one, triad).axis(name) for one in known]
+        # As stated: two digits.
+        stated = max(getattr(own, triad).axis(name))
+        assert stated == pytest.approx(np.sqrt(np.mean(np.square(sds))), rel=0.05)
 
 
 @pytest.mark.parametrize(
