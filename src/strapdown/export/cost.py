@@ -18,6 +18,9 @@ OPERATORS = {ast.Add: "add", ast.Sub: "add", ast.Mult: "multiply", ast.Div: "div
 #: a comparison does, which is not counted.
 LIBRARY = {"sqrt": "sqrt", "hypot": "sqrt", "fmod": "divide"}
 
+#: Most rounds of a loop by a condition; a series has at most ten.
+MOST_ROUNDS = 100
+
 
 def most_operations(kernel: Kernel, largest: Mapping[str, int] | None = None) -> dict[str, int]:
     """Count the operations of a function of `Kernels` on its longest way, with all that it calls.
@@ -77,12 +80,17 @@ class _Longest:
         if isinstance(node, ast.For):
             return self.loop(node)
         if isinstance(node, ast.While):
-            raise refused("a loop without a bound", node)
+            return self.rounds(node)
         total: Counter[str] = Counter()
         for value in (n for n in ast.iter_child_nodes(node) if isinstance(n, ast.expr)):
             total += self.of(value)
         if isinstance(node, ast.AugAssign) and not self.is_whole(node.target):
             total[OPERATORS[type(node.op)]] += 1
+        if isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
+            name = node.target.id
+            sum_of = ast.BinOp(ast.Name(name, ast.Load()), node.op, node.value)
+            if self.is_whole(sum_of):
+                self.whole[name] = self.value(sum_of)
         if isinstance(node, ast.Assign):
             for target in node.targets:
                 self.assign(target, node.value)
@@ -97,6 +105,19 @@ class _Longest:
             self.whole.pop(target.id, None)
             if self.is_whole(value):
                 self.whole[target.id] = self.largest.get(target.id, self.value(value))
+
+    def rounds(self, node: ast.While) -> Counter[str]:
+        """Count the rounds of a loop as long as its condition, of known integers, holds."""
+        total: Counter[str] = Counter()
+        for _ in range(MOST_ROUNDS):
+            holds = self.value(node.test)
+            if holds is None:
+                break
+            total += self.of(node.test)
+            if not holds:
+                return total
+            total += self.block(node.body)
+        raise refused("a loop without a bound", node)
 
     def loop(self, node: ast.For) -> Counter[str]:
         """Count the rounds of a loop, each with its own value of the variable."""
