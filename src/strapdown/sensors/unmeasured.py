@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -164,7 +165,8 @@ def _with_at_least(unit: CrashUnit, turns: Array, axes: Array) -> CrashUnit:
         stated = np.asarray(assumed.sd_of(name))
         larger = np.where(np.diagonal(lacks) > PART, np.maximum(stated, least), stated)
         if getattr(assumed, name) is not None and (larger > stated).any():
-            assumed = replace(assumed, **{name: tuple(larger.tolist())})
+            larger_sds: Any = tuple(larger.tolist())
+            assumed = replace(assumed, **{name: larger_sds})
     return unit if assumed is unit.assumed else replace(unit, assumed=assumed)
 
 
