@@ -438,10 +438,8 @@ def test_what_the_bounds_of_a_crash_rest_on_is_beside_them(tmp_path):
     assert found["Impact 2", direction] == "by assumption"
     assert found["Impact 1", direction] == found["Impact 2", "delta-V"] == ""
     of_model = "Author (2001): title, 2-1"
-    assert (
-        found["Severity", f"MAIS3+, {of_model}"]
-        == "the bound leaves the uncertainty of the model out"
-    )
+    alone = "the bound is of delta-V alone, not of the model"
+    assert found["Severity", f"MAIS3+, {of_model}"] == alone
     assert found["Severity", f"MAIS2+, {of_model}"] == ""
     assert "own_identifier" not in str(found)
 

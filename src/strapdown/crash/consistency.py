@@ -16,10 +16,15 @@ from strapdown.crash.acceleration import window_weights
 from strapdown.crash.measuring_point import LEVER_ARM, MOUNTING, NO_TURNING, PointKinematics
 from strapdown.crash.structure import (
     LARGEST_SHARE,
+    LEARNT_STEP,
+    MORE_TURNING,
     OFF_MOUNTING,
     OFF_POSITION,
     OFF_SCALE,
+    SMALL_SHAPE,
+    PointContrasts,
     Structure,
+    expected_squares,
     learn_share,
     single_error,
     unlearnt,
@@ -766,6 +771,10 @@ def compare_units(
     kept = ~np.any(cut, axis=0)
     common = [v.of_pieces(kept) for v in increments]
     structure = _of_vehicle(rigid, pairs, units, common, kept)
+    agreeing = {name for p in pairs if p.agree for name in (p.first, p.second)}
+    contrasts = point_contrasts([u for u in units if u.name in agreeing] or units, rigid)
+    if contrasts is not None:
+        structure = replace(structure, squares=expected_squares(rigid, contrasts))
     bent = [v.bent_by(structure, kept) for v in common]
     combined, combined_sd, against, chi, freedom = _against_all(units, bent, kept, structure)
     probability = chi_square_tail(chi, freedom)
@@ -791,6 +800,70 @@ def compare_units(
         tuple(u.name for u in units if doubted[u.name] or any(f.file == u.name for f in odd)),
         tuple(findings),
     )
+
+
+def point_contrasts(
+    units: Sequence[PointKinematics], structure: Structure
+) -> PointContrasts | None:
+    """Differences of the units while the force acts, and the shapes of what else makes them.
+
+    Shapes of increments: of a scale factor, a misalignment or a mounting angle, the specific force
+    itself; of a bias, the length of the interval; of a clock, the change of the specific force; of
+    a position with a gyro, the angular acceleration and the centripetal term; of a turning that no
+    gyro measured, its rates (`turning_shapes`). Each may have any size along any axis. None where
+    the record has too few samples.
+    """
+    first = max(float(u.time[0]) for u in units)
+    last = min(float(u.time[-1]) for u in units)
+    felt = structure.felt
+    felt = felt[(felt >= first) & (felt <= last)]
+    coarsest = max(float(np.median(np.diff(u.time))) for u in units)
+    if felt.size < 2 or felt[-1] - felt[0] < 2.0 * coarsest:
+        return None
+    count = int((felt[-1] - felt[0]) / max(LEARNT_STEP, 2.0 * coarsest))
+    edges = np.linspace(felt[0], felt[-1], max(count, 1) + 1)
+    kept = ~np.any([clipped_pieces(u, edges) for u in units], axis=0)
+    if not kept.any():
+        return None
+    values = []
+    for u in units:
+        sampling = str(u.imu.attrs["sampling"])
+        weights = [window_weights(u.time, *piece, sampling) for piece in itertools.pairwise(edges)]
+        values.append(np.array(weights) @ u.force)
+    seen = np.array([measured_axes(np.eye(3) - u.unmeasured) for u in units])
+    contrasts = []
+    for axis in range(3):
+        those = [v[kept, axis] for v, sees in zip(values, seen[:, axis], strict=True) if sees]
+        # Orthonormal rows across the sum of all, (j, j + 1).
+        across = np.linalg.svd(np.ones((1, max(len(those), 1))))[2][1:]
+        contrasts.append(across @ np.array(those) if those else np.zeros((0, kept.sum())))
+    return PointContrasts(edges, kept, contrasts, _shapes(units, edges, values)[kept])
+
+
+def _shapes(units: Sequence[PointKinematics], edges: Array, values: Sequence[Array]) -> Array:
+    """Shapes of errors and of a turning on the increments, (n, q): `point_contrasts`."""
+    lengths = np.diff(edges)
+    mean = np.mean(values, axis=0)
+    rest = np.mean([u.resting_force(STANDARD_GRAVITY)[0] for u in units], axis=0)
+    free = mean - lengths[:, None] * rest
+    late = np.gradient(free / lengths[:, None], axis=0)
+    groups = [free, late]
+    if any(u.gyro != NO_GYRO and u.moved is not None for u in units):
+        rates = []
+        for u in units:
+            steps = np.array([np.interp(edges, u.time, column) for column in u.rate.T]).T
+            rates.append(np.hstack([np.diff(steps, axis=0)]))
+        groups.append(np.mean(rates, axis=0))
+    shapes = [lengths[:, None]]
+    for group in groups:
+        # Components of the group, but for small ones: an error of them is of second order.
+        left, sizes, _ = np.linalg.svd(group, full_matrices=False)
+        shapes.append(left[:, sizes > SMALL_SHAPE * max(float(sizes[0]), TINY)])
+    if any(u.gyro == NO_GYRO for u in units):
+        pushed = np.append(0.0, np.cumsum(np.linalg.norm(free, axis=1)))
+        share = pushed / max(float(pushed[-1]), TINY)
+        shapes.append(np.diff([share, np.sin(np.pi * share)]).T)
+    return np.hstack(shapes)
 
 
 def _of_vehicle(
@@ -823,7 +896,6 @@ def _of_vehicle(
     return replace(
         rigid,
         share=np.sqrt(np.mean([one.share**2 for one in told], axis=0)),
-        expected=np.sqrt(np.mean([one.expected**2 for one in told], axis=0)),
         turning=float(np.sqrt(np.mean([one.turning**2 for one in told]))),
         correlation_time=float(np.median(times)) if times else rigid.correlation_time,
     )
@@ -1019,19 +1091,23 @@ def _turned_by_points(
     Conditional mean and covariance of the rates of a Gaussian process (`Structure.of_turning`),
     given the differences of the units' increments over the intervals `kept`. Structure may move a
     point across as far as it was learnt along any axis: a deformation in the direction of a
-    rotation is not distinguishable from the rotation.
+    rotation is not distinguishable from the rotation. The process may turn the vehicle further than
+    is stated, by the largest of `MORE_TURNING`: the points say how far, and where they do not, the
+    standard deviation is the stated one. So no bound depends on whether the differences happen to
+    exceed the stated uncertainty.
     """
     turned = _across(units)
     if turned is None or not kept.any():
         return None
     sds, across = turned
-    anywhere = replace(structure, share=np.full(3, structure.expected.max()))
-    increments = [one.bent_by(anywhere, kept) for one in increments]
     edges, until = increments[0].edges, min(u.assumed_until for u in units)
+    moves = np.kron(structure.expected_of_increments(edges)[np.ix_(kept, kept)], np.eye(3))
+    increments = [replace(one, force_noise=one.force_noise + moves) for one in increments]
     size, others = increments[0].values.size, len(units) - 1
     less = np.hstack([-np.tile(np.eye(size), (others, 1)), np.eye(others * size)])
     joint = joint_covariance(increments, without=(NO_TURNING,))
-    walk = structure.turning**2 * structure.of_turning(edges, until)
+    stated = structure.of_turning(edges, until)
+    walk = (1.0 + float(MORE_TURNING[-1]) ** 2) * stated
     seen = walk[np.ix_(kept, kept)]
     joint = joint + np.einsum("ab,icx,jcy->iaxjby", seen, across, across).reshape(joint.shape)
     covariance = floored(less @ joint @ less.T)
@@ -1057,6 +1133,8 @@ def _turned_by_points(
     for sums in (upto, angle):
         whole = np.kron(sums, np.diag(np.degrees(sds)))
         variance = np.maximum(np.einsum("ij,jk,ik->i", whole, left, whole), 0.0)
+        most = np.einsum("ij,jk,ik->i", whole, np.kron(stated, np.eye(3)), whole)
+        variance = np.minimum(variance, most)
         out += [(whole @ steps).reshape(-1, 3), np.sqrt(variance).reshape(-1, 3)]
     return PointTurning(edges, *out)
 
@@ -1176,7 +1254,7 @@ def _of_structure(units: Sequence[PointKinematics], structure: Structure) -> lis
     """Report what the differences show beyond the sensors: structure, and turning."""
     found = []
     names = ", ".join(u.name for u in units)
-    if structure.share.any():
+    if structure.reported:
         found.append(
             Finding(
                 "crash.points-move-with-structure",
@@ -1187,7 +1265,7 @@ def _of_structure(units: Sequence[PointKinematics], structure: Structure) -> lis
                 right=structure.sd[1],
                 down=structure.sd[2],
                 share=100.0 * float(structure.expected.max()),
-                correlation_ms=1e3 * structure.correlation_time,
+                correlation_ms=1e3 * structure.expected_time,
             )
         )
     if structure.turning > 1.0:

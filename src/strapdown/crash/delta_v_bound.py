@@ -23,8 +23,12 @@ from strapdown.rotation import cross_matrix
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
+#: Names of the windows in words.
+WINDOWS = {"peak": "peak", "event": "contact"}
 #: Line of the error budget: of the mean force before the crash, which is subtracted.
 AT_REST = "level before the crash"
+#: Names of the windows in words.
+WINDOWS = {"peak": "peak", "event": "contact"}
 #: Line of the error budget: of the instants that bound the window.
 WINDOW_ENDS = "time of the window"
 
@@ -192,7 +196,8 @@ class VelocityChange:
     Attributes
     ----------
     window : {'peak', 'event'}
-        The trailing window in which the change is largest, or the whole contact.
+        The trailing window in which the change is largest, or the whole contact of the event; the
+        event of 49 CFR 563, from its time zero on, is a third window, of no change here.
     delta_v : DeltaV
         In its frame: ``body``, as recorders integrate, or ``ned``, gravity subtracted by the
         attitude.
@@ -309,8 +314,9 @@ def change_line(change: VelocityChange) -> str:
         if change.interval.horizontal.undetermined
         else f"{at:.1f} deg ({low:.1f} to {high:.1f})"
     )
+    window = WINDOWS[change.window]
     return (
-        f"{change.window} {change.delta_v.start:.4f} to {change.delta_v.end:.4f} s: {axes} "
+        f"{window} {change.delta_v.start:.4f} to {change.delta_v.end:.4f} s: {axes} "
         f"{parts} m/s; {name} {direction}"
     )
 

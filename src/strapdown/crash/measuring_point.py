@@ -130,7 +130,7 @@ class _UnitEffects:
         added = np.zeros((n, 3)) if force is None else force
         if rate is not None and contributor != TIMING and self.moved.lever_arm.any():
             added = added + self.moved.of_rate(rate)
-        if contributor not in (MISSING_AXIS, LEVELLING):
+        if contributor not in (MISSING_AXIS, TURNED_AXIS, LEVELLING):
             # Sensor and lever-arm errors do not affect an assumed axis.
             added, rest = added @ self.measured, rest @ self.measured
         # Matching the stationary force to the length of gravity cancels the component of an
@@ -342,6 +342,12 @@ def assumed_effects(prepared: PreparedUnit, lever_arm: Array) -> Iterator[Assume
     centripetal acceleration ``ω² (r - e (e·r))`` of a lever arm r has the root mean square
     ``√3 sd²`` of a normal rate, and is one unknown. Products of a rotation and a missing axis are
     neglected: 4 deg and 0.8 m/s give 0.03 m/s.
+
+    A change of velocity along a missing axis may be stated along the axis as it was at the impact,
+    as a film or tire marks show it, or as it turns with the vehicle. With the specific force f of
+    the measured axes and a rotation φ these differ by ``φ × f`` along the missing axis: 2 deg and
+    18 m/s by 0.2 m/s. As either may be meant, a turning that no gyro measures has this as unknowns
+    of its own, beside the error of the attitude that it makes.
     """
     unit = prepared.unit
     time = prepared.imu.index.to_numpy(dtype=np.float64)
@@ -358,6 +364,8 @@ def assumed_effects(prepared: PreparedUnit, lever_arm: Array) -> Iterator[Assume
         free = slow_part((force - at_rest) @ (np.eye(3) - axes), time)
         shapes = turning_shapes(time, turning.over, sampling, np.linalg.norm(free, axis=1))
         yield from _of_turning(turning, turns, (time, shapes), force, lever_arm)
+        if axes.any():
+            yield from _of_turned_axes(turning, turns, (time, shapes), free, axes)
     if unit.assumed is not None and axes.any():
         shapes = assumed_shapes(time, unit.assumed.over, sampling)
         for name, along in _directions(unit.assumed.sd_of("delta_v_sd"), axes, AXES):
@@ -395,6 +403,20 @@ def _of_turning(
             )
     if means.any():
         yield "assumed turns squared", NO_TURNING, means, None
+
+
+def _of_turned_axes(
+    assumed: Assumed, turns: Array, profiles: tuple[Array, Array], free: Array, axes: Array
+) -> Iterator[AssumedEffect]:
+    """What turned axes measure along missing ones, (3, 3), by the force without gravity, (n, 3)."""
+    time, shapes = profiles
+    steps = np.diff(time, prepend=2.0 * time[0] - time[1])
+    for name, degrees in _directions(assumed.sd_of("turn_sd_deg"), turns, TURNS):
+        across = np.cross(np.radians(degrees), free) @ axes
+        if across.any():
+            for shape, how in zip(shapes, TURN_SHAPES, strict=True):
+                leak = np.cumsum(shape * steps)[:, None] * across
+                yield f"assumed axis turned by {name} {how}", TURNED_AXIS, leak, None
 
 
 def _directions(
@@ -445,6 +467,7 @@ LEVER_ARM = "lever arm"
 MOUNTING = "mounting"
 NO_TURNING = "assumed: no turning"
 MISSING_AXIS = "assumed: missing axis"
+TURNED_AXIS = "assumed: missing axis turned"
 TIMING = "timing"
 
 

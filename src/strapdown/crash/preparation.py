@@ -39,7 +39,12 @@ from strapdown.sensors.saturation import RangeLimits, find_limits
 from strapdown.sensors.synchronise import SynchronisedUnit, SynchronisedUnits
 from strapdown.sensors.triad_errors import ZERO, Triad, check_sd, finite, span, triad_of, triple
 from strapdown.sensors.uncertainty import TriadUncertainty
-from strapdown.sensors.unmeasured import assumed_findings, with_filled_axes, with_gyro
+from strapdown.sensors.unmeasured import (
+    assumed_findings,
+    with_common_assumptions,
+    with_filled_axes,
+    with_gyro,
+)
 from strapdown.tables import ACCEL, imu_table
 
 Array = NDArray[np.float64]
@@ -332,8 +337,17 @@ def prepare_together(
     `options`: of `prepare_unit` for all units; under the name of a unit, a mapping of its own. A
     unit that borrows its gyro, is not leveled by an option, and whose record begins after the
     lender's stationary interval is leveled by the lender: roll and pitch are propagated with the
-    gyro to the start of the borrower's record, with their standard deviation.
+    gyro to the start of the borrower's record, with their standard deviation. What units assume of
+    the vehicle is the largest that one of them states.
     """
+    stated = {u.unit.name: u.unit.assumed for u in together.units}
+    of_vehicle = with_common_assumptions([u.unit for u in together.units])
+    together = replace(
+        together,
+        units=tuple(
+            replace(u, unit=unit) for u, unit in zip(together.units, of_vehicle, strict=True)
+        ),
+    )
     names = {u.unit.name for u in together.units}
     common = {k: v for k, v in options.items() if k not in names}
     turning = [u.unit.name for u in together.units if u.lender is None and _turns(u)]
@@ -369,6 +383,14 @@ def prepare_together(
             ) from None
         if hint is not None:
             prepared = replace(prepared, findings=(*prepared.findings, hint))
+        if unit.unit.assumed != stated[unit.unit.name]:
+            larger = Finding(
+                "crash.assumed-more-elsewhere",
+                severity="note",
+                file=unit.unit.name,
+                quantity="assumed",
+            )
+            prepared = replace(prepared, findings=(*prepared.findings, larger))
         done[unit.unit.name] = at_point(prepared, point, time_sd=unit.time_sd)
     return [done[u.unit.name] for u in together.units]
 

@@ -410,7 +410,7 @@ def _crash(part: RunPart) -> Iterator[Value]:
         }
         value = _percent(_number(one, "probability"))
         alone = _at(one, "model_uncertainty_in_bound") is False
-        note = "the bound leaves the uncertainty of the model out" if alone and more else ""
+        note = "the bound is of delta-V alone, not of the model" if alone and more else ""
         yield from _row(key, "Severity", label, value, "%", **more, note=note)
     indices = _tables(data, "indices")
     several = Counter((_word(one, "index"), _word(one, "of")) for one in indices)

@@ -399,7 +399,7 @@ def _comparison(comparison: UnitComparison) -> dict[str, Any]:
         "structure": {
             "sd_forward_right_down_m_per_s": comparison.structure.sd.tolist(),
             "share_of_delta_v": comparison.structure.expected.tolist(),
-            "correlation_time_s": comparison.structure.correlation_time,
+            "correlation_time_s": comparison.structure.expected_time,
             "turning_of_assumed": comparison.structure.turning,
         },
         "turning_by_points": None

@@ -473,7 +473,7 @@ def pdof_charts(
         ),
         chart(
             "pdof-by-time-zero",
-            "time zero",
+            "the onset",
             "windows that begin earlier (negative) or later than the onset of the contact and end "
             "with it",
             "shift of the onset, ms",
@@ -610,11 +610,11 @@ def accelerations_chart(
         "accelerations",
         "Acceleration of the reference point by every recorder",
         "In the axes of the vehicle, forward, right, down, less the specific force at rest, "
-        f"{how}; 1 g = 9.80665 m/s². Shaded: the event.",
+        f"{how}; 1 g = 9.80665 m/s². Shaded: the 49 CFR 563 event.",
         SINCE_TRIGGER,
         tuple(Panel(f"{axis}, g", tuple(rows[k]), height=0.9) for k, axis in enumerate(AXES)),
         marks=event_marks(events, *span),
-        bands=tuple(Band(1e3 * e.time_zero, 1e3 * e.end, "event") for e in events),
+        bands=tuple(Band(1e3 * e.time_zero, 1e3 * e.end, "563 event") for e in events),
     )
 
 

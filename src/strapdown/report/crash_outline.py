@@ -223,7 +223,7 @@ def path_moments(path: CrashPath, events: Sequence[CrashEvent]) -> list[tuple[st
     Returns
     -------
     list of (str, float)
-        ``begin`` (of the window), ``entry``, ``time zero`` and ``event end`` of each event,
+        ``begin`` (of the window), ``entry``, ``time zero`` and ``563 event end`` of each event,
         ``end``; names of instants at the same sample are joined by commas.
     """
     many = len(events) > 1
@@ -233,7 +233,7 @@ def path_moments(path: CrashPath, events: Sequence[CrashEvent]) -> list[tuple[st
         which = f" {k}" if many else ""
         found.append((f"time zero{which}", event.time_zero))
         if not event.lasts_beyond_record:
-            found.append((f"event end{which}", event.end))
+            found.append((f"563 event end{which}", event.end))
     found.append(("end", end))
     step = float(np.median(np.diff(path.time))) if len(path.time) > 1 else 0.0
     out: list[tuple[str, float]] = []
@@ -251,7 +251,8 @@ def event_marks(
     events: Sequence[CrashEvent], begin: float, end: float, scale: float = 1e3
 ) -> tuple[Mark, ...]:
     """Marks at time zero and at the end of each event, as `marks_apart`."""
-    named = [(e.time_zero, "time zero") for e in events] + [(e.end, "event end") for e in events]
+    named = [(e.time_zero, "time zero") for e in events]
+    named += [(e.end, "563 event end") for e in events]
     return marks_apart(named, begin, end, scale)
 
 

@@ -136,8 +136,8 @@ def pdof_dial(
     caption = (
         "Where the force came from, seen from above, in vehicle axes: 0° the front, positive "
         f"clockwise, +90° the right side. The arrow pushes at the {point_name}; wedge and numbers "
-        "in brackets: 95 % interval of the direction, from the change of velocity between time "
-        "zero and the end of the event along the turning axes."
+        "in brackets: 95 % interval of the direction, from the change of velocity over the contact "
+        "along the turning axes."
     )
     return Picture("pdof", out.svg(), "Direction of force", caption, alt, width_mm=84.0)
 

@@ -79,7 +79,7 @@ def unit_signals(
     if synchronised.lender is None and recorded.gyro is not None:
         about.append(_rates(recorded.gyro, recorded, synchronised, unit, number, span))
     marks = event_marks(events, *span)
-    bands = tuple(Band(1e3 * e.time_zero, 1e3 * e.end, "event") for e in events)
+    bands = tuple(Band(1e3 * e.time_zero, 1e3 * e.end, "563 event") for e in events)
     return [
         _overview(unit, number, events),
         *(replace(chart, marks=marks, bands=bands) for chart in about),
@@ -134,7 +134,7 @@ def _about_the_crash(
         f"signals-{number + 1}",
         f"{unit.name}: specific force about the crash",
         "Specific force at the recorder. Thin: as recorded; thick: as processed. "
-        "Shaded: the event." + _told([axis for axis in AXES if axis in assumed]),
+        "Shaded: the 49 CFR 563 event." + _told([axis for axis in AXES if axis in assumed]),
         SINCE_TRIGGER,
         tuple(
             Panel(
@@ -189,7 +189,8 @@ def _rates(
         f"rates-{number + 1}",
         f"{unit.name}: rates about the crash",
         "Rates about the vehicle's axes: roll about forward (right side down is positive), pitch "
-        "about right (nose up), yaw about down (clockwise from above). Shaded: the event.",
+        "about right (nose up), yaw about down (clockwise from above). "
+        "Shaded: the 49 CFR 563 event.",
         SINCE_TRIGGER,
         tuple(
             Panel(f"{turn}, deg/s", tuple(_once(rows[k])), levels=tuple(levels[k]), height=0.9)
@@ -217,7 +218,7 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
         ]
         if lines and np.isfinite(values).any():
             panels.append(Panel(label, tuple(lines), height=0.9))
-    bands = [Band(e.time_zero, e.end, "event") for e in events]
+    bands = [Band(e.time_zero, e.end, "563 event") for e in events]
     rest = unit.at_point.rest
     if rest is not None:
         bands.append(Band(rest.start, rest.end, "rest"))
@@ -230,7 +231,7 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
         f"overview-{number + 1}",
         f"{unit.name}: the whole record",
         "Merged specific force (−1 g downward at rest) and rates along and about the vehicle's "
-        f"axes. Shaded: the event; {said}." + _told(assumed),
+        f"axes. Shaded: the 49 CFR 563 event; {said}." + _told(assumed),
         "time from the trigger, s",
         tuple(panels),
         marks=marks_apart(

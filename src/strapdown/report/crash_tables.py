@@ -77,7 +77,7 @@ def answers_table(result: CaseResult) -> TableBlock | None:
         (
             "recorder",
             "event",
-            "from, to, s",
+            "contact, s",
             f"forward, {speed_unit()}",
             f"right, {speed_unit()}",
             f"down, {speed_unit()}",
@@ -87,7 +87,7 @@ def answers_table(result: CaseResult) -> TableBlock | None:
         tuple(rows),
         text=(0, 1, 2),
         caption=f"Delta-V of the {result.spec.point.name} in the axes of the vehicle, with 95 % "
-        "bounds; a frontal crash has a negative forward component.",
+        "bounds, over the contact; a frontal crash has a negative forward component.",
         strong=tuple(strong),
     )
 
@@ -110,7 +110,7 @@ def direction_table(result: CaseResult) -> TableBlock | None:
                 rows.append(
                     (
                         recorder(unit, result),
-                        f"{k + 1}, {'event' if window == 'event' else 'largest'}"
+                        f"{k + 1}, {'contact' if window == 'event' else 'largest'}"
                         + (", recorded part" if change.at_least else ""),
                         f"{plain(angle.horizontal_deg, 1)}°" if known else "not determined",
                         _ends(across) if known else "all",
@@ -136,7 +136,7 @@ def direction_table(result: CaseResult) -> TableBlock | None:
         ),
         tuple(rows),
         text=(0, 1),
-        caption="Principal direction of force over the event, and over the "
+        caption="Principal direction of force over the contact, and over the "
         f"{ms:.3g} ms of the largest change. Horizontal: from the front of the vehicle, clockwise "
         f"from above; vertical: positive from above; {axes} and vertical there: {told}.",
     )
@@ -457,7 +457,7 @@ def severity_table(result: CaseResult) -> TableBlock | None:
                 answer.model.outcome,
                 words,
                 bound,
-                "in the bound" if answer.model.covariance else "not stated",
+                "delta-V and the model" if answer.model.covariance else "delta-V alone",
                 *((answer.model.source,) if len(sources) > 1 else ()),
             )
         )
@@ -469,7 +469,7 @@ def severity_table(result: CaseResult) -> TableBlock | None:
     name = MEAN if combined is not None and of == combined.name else of
     return TableBlock(
         (
-            *("outcome", "probability", "95 % bound", "uncertainty of the model"),
+            *("outcome", "probability", "95 % bound", "the bound is of"),
             *(("source",) if len(sources) > 1 else ()),
         ),
         tuple(rows),

@@ -13,8 +13,10 @@ from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.case import CaseResult
 from strapdown.crash.case_contact import OF_DRIVES, main_event
 from strapdown.crash.closure import Closure
+from strapdown.crash.contact import Edge
+from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import VelocityChange
-from strapdown.crash.measuring_point import MISSING_AXIS, NO_TURNING
+from strapdown.crash.measuring_point import MISSING_AXIS, NO_TURNING, TURNED_AXIS
 from strapdown.crash.pdof import AngleInterval, Pdof
 from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.errors import Finding
@@ -134,8 +136,8 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
                 "Delta-V",
                 change_words(whole),
                 change_range(whole),
-                f"over the contact, {instant(whole.delta_v.start)} to "
-                f"{instant(whole.delta_v.end)}; largest in {ms:.3g} ms {change_words(peak)}",
+                f"over the contact, {_edge_words(changes.contact.start)} to "
+                f"{_edge_words(changes.contact.end)}; largest in {ms:.3g} ms {change_words(peak)}",
             )
         )
         across = whole.interval.horizontal
@@ -191,6 +193,7 @@ def lead(result: CaseResult) -> str:
         )
         if whole.at_least:
             parts.append(f"{incomplete_words(whole)} The change is {change_range(whole)}.")
+        parts.append(windows_words(unit, number))
         others = len(unit.body) - 1
         if others:
             parts.append(
@@ -209,6 +212,37 @@ def lead(result: CaseResult) -> str:
         assumption_words(result),
     ]
     return " ".join(p for p in parts if p)
+
+
+def _edge_words(edge: Edge) -> str:
+    """Return onset or end of a contact with its bound."""
+    return about(edge.time, TWO_SIDED_95 * edge.sd, "s")
+
+
+def windows_words(unit: UnitReconstruction, number: int) -> str:
+    """Return where the contact of an event begins and why, and the window of the regulation."""
+    contact, event = unit.body[number].contact, unit.events.events[number]
+    start = contact.start
+    half = about(1e3 * abs(start.time), 1e3 * TWO_SIDED_95 * start.sd, "ms")
+    side = "before" if start.time < 0.0 else "after"
+    words = (
+        f"The contact begins {half} {side} the trigger, where the acceleration leaves its level of "
+        "before; the bound is for how slowly it rises"
+    )
+    if start.time < 0.0 < contact.end.time:
+        lost = delta_v(unit.acceleration, start.time, 0.0, across_gaps=True)
+        least = 0.1 / speed_factor()
+        size = speed_words(max(lost.resultant, least))
+        less = "less than " * (lost.resultant < least)
+        words += f". By the trigger the velocity had changed by {less}{size}"
+        if lost.resultant < unit.body[number].event.resultant_bound:
+            words += ", so that an earlier or later onset hardly changes delta-V"
+    end = "beyond the record" if event.lasts_beyond_record else f"to {instant(event.end)}"
+    return (
+        f"{words}. The 49 CFR 563 event is another window, {instant(event.time_zero)} {end}: it "
+        "begins and ends where the change within 20 ms passes 0.8 km/h, and no number here is the "
+        "change over it."
+    )
 
 
 #: Why the record holds only a part of a change of velocity.
@@ -278,7 +312,7 @@ def references_words(result: CaseResult) -> Iterator[str]:
 
 
 #: Contributors of the error budget that a case assumes instead of a measurement.
-ASSUMED = (NO_TURNING, MISSING_AXIS)
+ASSUMED = (NO_TURNING, MISSING_AXIS, TURNED_AXIS)
 
 
 def on_assumption(result: CaseResult) -> tuple[str, ...]:
@@ -906,17 +940,17 @@ def _levers(result: CaseResult) -> Iterator[tuple[str, str, str]]:
         (float(np.linalg.norm(point - unit.mounting.position)), unit.name) for unit in result.units
     )
     comparison = result.reconstruction.comparison
-    bent = np.zeros(3) if comparison is None else comparison.structure.sd
+    structure = None if comparison is None else comparison.structure
     if longest > 0.0:
         far = f"{plain(length_factor() * longest, 2)} {length_unit()}"
         told = f"{result.spec.point.name}, up to {far} ({name})"
-        if bent.any():
+        if structure is not None and structure.reported:
             yield (
                 "shared-deformation",
                 "Deformation that all recorders share is not seen",
                 "By their differences they moved against each other with a standard deviation of "
-                f"up to {speed_words(float(bent.max()))} while the force acted; that is in the "
-                f"bounds. A deformation between all and the {told}, is not.",
+                f"up to {speed_words(float(structure.sd.max()))} while the force acted; that is in "
+                f"the bounds. A deformation between all and the {told}, is not.",
             )
             return
         yield (
@@ -1117,7 +1151,7 @@ CONVENTIONS = (
         "side; on the clock 12 is the front",
     ),
     (
-        "Event, time zero, end",
+        "563 event: time zero, end",
         "49 CFR 563.5(b): 8 km/h within 150 ms make an event; it begins with 0.8 km/h within 20 ms "
         "and ends when the resultant change within 20 ms becomes that or less",
     ),
@@ -1148,7 +1182,7 @@ def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
     spec = result.spec
     options, entry = spec.options, spec.entry
     comparison = result.reconstruction.comparison
-    bent = comparison is not None and bool(comparison.structure.sd.any())
+    bent = comparison is not None and comparison.structure.reported
     found = [
         (
             "Structure",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -130,6 +131,43 @@ def assumed_findings(unit: CrashUnit) -> list[Finding]:
             )
         )
     return found
+
+
+def with_common_assumptions(units: Sequence[CrashUnit]) -> list[CrashUnit]:
+    """State the same of the vehicle in all its units: the largest of what they assume of an axis.
+
+    Its turning, and the change of velocity of its point along an axis, are one unknown in however
+    many units they are stated. Of units prepared by `with_filled_axes` and `with_gyro`, as far as
+    each lacks the axis.
+    """
+    turns, axes = np.zeros(3), np.zeros(3)
+    for unit in units:
+        if unit.assumed is not None:
+            lacks_turn = np.diagonal(unmeasured_turns(unit)) > PART
+            if unit.lender is None:
+                turns = np.maximum(turns, lacks_turn * unit.assumed.sd_of("turn_sd_deg"))
+            lacks_axis = np.diagonal(unmeasured_axes(unit)) > PART
+            axes = np.maximum(axes, lacks_axis * unit.assumed.sd_of("delta_v_sd"))
+    return [_with_at_least(unit, turns, axes) for unit in units]
+
+
+def _with_at_least(unit: CrashUnit, turns: Array, axes: Array) -> CrashUnit:
+    lender = None if unit.lender is None else _with_at_least(unit.lender, turns, axes)
+    if lender is not unit.lender:
+        unit = replace(unit, lender=lender)
+    assumed = unit.assumed
+    if assumed is None:
+        return unit
+    for name, least, lacks in (
+        ("turn_sd_deg", turns, unmeasured_turns(unit)),
+        ("delta_v_sd", axes, unmeasured_axes(unit)),
+    ):
+        stated = np.asarray(assumed.sd_of(name))
+        larger = np.where(np.diagonal(lacks) > PART, np.maximum(stated, least), stated)
+        if getattr(assumed, name) is not None and (larger > stated).any():
+            larger_sds: Any = tuple(larger.tolist())
+            assumed = replace(assumed, **{name: larger_sds})
+    return unit if assumed is unit.assumed else replace(unit, assumed=assumed)
 
 
 def _missing(triad: RecordedTriad, columns: Sequence[str]) -> tuple[int, ...]:

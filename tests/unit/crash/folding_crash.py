@@ -284,11 +284,14 @@ def prepared(units, options):
 
 
 #: Figures of an answer whose coverage is counted.
-FIGURES = ("forward", "right", "resultant", "PDOF", "position forward", "position right")
+FIGURES = (
+    *("forward", "right", "resultant", "PDOF", "position forward", "position right"),
+    "largest in 30 ms",
+)
 
 
 def errors(answer, crash):
-    """Errors of an answer over the half widths of its 95 % bounds, (6,)."""
+    """Errors of an answer over the half widths of its 95 % bounds, (7,)."""
     change, path = answer.delta_v, answer.path
     true = crash.truth(change.delta_v.start, change.delta_v.end)
     off = change.delta_v.vector - true
@@ -300,4 +303,7 @@ def errors(answer, crash):
     at = path.table[["north", "east"]].iloc[-1].to_numpy() - crash.position(path.time[-1])[:2]
     whole = np.array([*off[:2], change.resultant - math.hypot(*true[:2]), turn, *at])
     half = [*change.bound.half_width[:2], change.resultant_bound, wide]
-    return whole / [*half, *(1.96 * path.sd[["north", "east"]].iloc[-1])]
+    of = next(one for one in answer.body if one.event is change).peak
+    truth = np.linalg.norm(crash.truth(of.delta_v.start, of.delta_v.end))
+    whole = np.append(whole, of.resultant - truth)
+    return whole / [*half, *(1.96 * path.sd[["north", "east"]].iloc[-1]), of.resultant_bound]

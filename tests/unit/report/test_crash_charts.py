@@ -54,7 +54,7 @@ def test_the_curves_of_delta_v_end_at_the_answer():
         np.testing.assert_allclose(bar.y, [3.6 * (value - half), 3.6 * (value + half)])
         assert f"{abs(3.6 * value):.1f} ± {3.6 * half:.1f} km/h" in panel.title
         assert panel.y_label.endswith("km/h")
-    assert [m.label for m in chart.marks] == ["time zero", "event end"]
+    assert [m.label for m in chart.marks] == ["time zero", "563 event end"]
     unit = line(chart.panels[0], "IMU2")
     own = found.units[1].acceleration
     assert unit.colour == SERIES_COLOURS[1] and unit.dash != line(chart.panels[0], "IMU1").dash
@@ -124,7 +124,7 @@ def test_signals_are_as_recorded_and_marked_where_a_range_ends():
     assert merged.x[-1] <= 1e3 * (end + 0.10) + 1e-6
     assert [(b.start, b.end) for b in figures.signals.bands] == [(1e3 * zero, 1e3 * end)]
     assert figures.rates is not None
-    assert {b.label for b in figures.overview.bands} >= {"event"}
+    assert {b.label for b in figures.overview.bands} >= {"563 event"}
 
 
 def test_signals_are_turned_into_vehicle_axes_and_missing_axes_spoil_no_other():
