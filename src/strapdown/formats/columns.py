@@ -68,6 +68,10 @@ _SIGNS = r"[\s_\-/:,;|.#]+"
 _BRACKETS = re.compile(r"[\[(]\s*((?:[^\[\]()]|\([^()]*\))*?)\s*[\])]\s*$")
 # A unit before the axis: Angular velocity (deg/s) X, of a heading in two rows.
 _UNIT_INSIDE = re.compile(r"(.*?\S)\s*[\[(]([^\[\]()]+)[\])]\W*([xyzXYZ])")
+# The hemisphere behind an angle: LATITUDE N/S, longitude (W).
+_HEMISPHERE = re.compile(
+    r"((?:^|.*[\s_])(?:lat|lon|lng)[a-z]*)[\s_(\[]+(?:N/S|E/W|[NSEW])[\])]?$", re.I
+)
 # Clocks of X-Plane's data output: of the simulated world and of all.
 _XPLANE = ("_totl,_time",)
 # Words and numbers of a heading, whose capitals may begin words.
@@ -127,8 +131,8 @@ def _read_name(name: str, of: Vocabulary, unit: str) -> ColumnName:
         if not of.sensors:
             return ColumnName(None)  # q[0] is a part of an array, not a column q in units of 0
         text, index = match.groups()
-    if not of.sensors:
-        text = re.sub(r"[\s_(]+(?:N/S|E/W)\)?$", "", text)  # letters behind the number
+    if not of.sensors and len(text) <= LONGEST:
+        text = _HEMISPHERE.sub(r"\1", text)
     said = _of_format(text, index) if of.sensors else None
     inside = _UNIT_INSIDE.fullmatch(text) if of.sensors else None
     if inside and find_unit(inside[2], of.kinds):

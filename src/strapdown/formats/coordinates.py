@@ -58,6 +58,8 @@ def with_degrees(raw: RawLog, found: Mapping[str, Found]) -> RawLog:
     places = {q: changed.get(found[q].source, raw.columns[found[q].source]) for q in _ANGLES}
     if all(v.dtype.kind in "iuf" for v in places.values()):
         form, scaled = _in_one_number(places)
+        if form == "1e-7 deg" and not found["lat"].source.lower().endswith("e7"):
+            _refuse_open_scale(raw, scaled)
         changed |= {found[q].source: v for q, v in scaled.items()}
         # A name that says it (latitudeE7) says that heights are not scaled likewise.
         if form == "1e-7 deg" and not found["lat"].source.lower().endswith("e7"):
@@ -95,17 +97,42 @@ def _of_texts(raw: RawLog, source: str, quantity: str, letters: str) -> Array:
     return out
 
 
+#: Words of hemispheres, by their letter; of the letter O the language says whether it is east.
+_WORDS = {
+    word: letter
+    for letter, words in {
+        "N": "n north nord norte",
+        "S": "s south sud sur sul süd zuid",
+        "E": "e east est este ost leste",
+        "W": "w west ouest oeste ovest",
+    }.items()
+    for word in words.split()
+}
+#: The hemisphere at the end of a name: longitude (W), lat_N.
+_IN_NAME = re.compile(r"(?:lat|lon|lng)[a-z]*[\s_(\[]+([NSEW])[\])]?$", re.I)
+
+
 def _sides(raw: RawLog, source: str, letters: str) -> Array | None:
-    """Return the signs by a column of the letters of hemispheres, the nearest behind; or None."""
+    """Return the signs by the name, or by a column of hemispheres, the nearest behind; or None.
+
+    DataError: a column has the letter O beside no other, which is east or west.
+    """
+    named = _IN_NAME.search(source.strip()[-20:])
+    if named and named[1].upper() in letters:
+        return np.array(-1.0 if named[1].upper() == letters[1] else 1.0)
     names = list(raw.columns)
     at = names.index(source)
     for name in names[at + 1 :] + names[:at]:
         values = raw.columns[name]
-        if values.dtype.kind != "O" or str(values[0]).strip().upper() not in tuple(letters):
+        if values.dtype.kind != "O":
             continue
-        said = np.array(["" if v is None else str(v).strip().upper() for v in values])
-        if set(said.tolist()) <= {*letters, ""}:
-            return np.where(said == letters[1], -1.0, 1.0)
+        said = ["" if v is None else str(v).strip().lower() for v in values]
+        there = set(said) - {""}
+        if there == {"o"} and letters == "EW" and name == names[(at + 1) % len(names)]:
+            raise raw.fault("io.hemisphere-open", "lon", source=name)
+        known = {w: _WORDS.get(w, "W" if w == "o" and "e" in there else "") for w in there}
+        if there and set(known.values()) <= set(letters):
+            return np.array([-1.0 if known.get(w) == letters[1] else 1.0 for w in said])
     return None
 
 
@@ -115,9 +142,11 @@ def _in_one_number(places: Mapping[str, NDArray[Any]]) -> tuple[str, dict[str, A
     known = {q: np.abs(v[np.isfinite(v)]) for q, v in values.items()}
     if any(not v.size for v in known.values()):
         return "", {}
-    beyond = any(known[q].max() > most for q, (most, _) in _ANGLES.items())
-    if not beyond:
+    if all(known[q].max() <= most for q, (most, _) in _ANGLES.items()):
         return "", {}
+    if known["lat"].max() <= 90.0 and known["lon"].max() <= 360.0 and values["lon"].min() >= 0.0:
+        turned = values["lon"] - np.where(values["lon"] > 180.0, 360.0, 0.0)
+        return "degrees, longitudes from 0 to 360", {"lat": values["lat"], "lon": turned}
     if all(
         (v % 1.0 == 0.0).all() and v.max() <= 1e7 * _ANGLES[q][0] for q, v in known.items()
     ) and (max(known["lat"].max(), known["lon"].max()) > 1e5):
@@ -126,6 +155,19 @@ def _in_one_number(places: Mapping[str, NDArray[Any]]) -> tuple[str, dict[str, A
         whole = {q: np.trunc(v / 100.0) for q, v in values.items()}
         return "ddmm.mmmm", {q: whole[q] + (v - 100.0 * whole[q]) / 60.0 for q, v in values.items()}
     return "", {}
+
+
+def _refuse_open_scale(raw: RawLog, degrees: Mapping[str, Array]) -> None:
+    """Refuse whole numbers that are within the Earth's range in 1e-6 deg as well as in 1e-7."""
+    if all(float(np.nanmax(np.abs(degrees[q]))) <= 0.1 * _ANGLES[q][0] for q in _ANGLES):
+        raise raw.fault(
+            "io.coordinate-scale-open",
+            "lat, lon",
+            lat=float(degrees["lat"][0]),
+            lon=float(degrees["lon"][0]),
+            lat_10=10.0 * float(degrees["lat"][0]),
+            lon_10=10.0 * float(degrees["lon"][0]),
+        )
 
 
 def _heights_in_mm(raw: RawLog, found: Mapping[str, Found]) -> dict[str, Array]:

@@ -776,44 +776,64 @@ def one_clock_of_parts(
 
 
 def _digits_of_clock(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Return a date and a time of day that are numbers of digits, 20240506 and 93015.2, as texts.
+    """Return a time of day that is a number of digits, 93015.2, and a date, 20240506, as texts.
 
-    Both are required, by their names. A date of six digits becomes none, for it leaves open which
-    of them are the year (240506 may be of 2024 or of 2006), and the time counts from midnight.
+    Beside a date its name is enough; alone, a time of day goes on from 59 to 100: as a number of
+    seconds it jumps by 40 more at each full minute. A date of six digits becomes none, for it
+    leaves open which of them are the year (240506 may be of 2024 or of 2006), and the time counts
+    from midnight.
     """
-    named = {
-        word: [n for n, c in columns.items() if c.dtype.kind in "iuf" and _says(n, word)]
-        for word in ("date", "time")
-    }
-    if any(len(names) != 1 for names in named.values()):
+    numeric = [n for n, c in columns.items() if c.dtype.kind in "iuf"]
+    dates = [n for n in numeric if _says(n, "date")]
+    clocks = [n for n in numeric if _says(n, "time")]
+    if len(clocks) != 1 or len(dates) > 1:
         return {}
-    (date,), (clock,) = named.values()
-    day, of_day = columns[date].astype(np.float64), columns[clock].astype(np.float64)
+    of_day = columns[clocks[0]].astype(np.float64)
     whole = np.floor(of_day)
     parts = [whole // 10_000, whole // 100 % 100, whole % 100]
-    if not (np.isfinite(day).all() and np.isfinite(of_day).all()) or any(
+    if not np.isfinite(of_day).all() or any(
         (v < 0).any() or (v >= most).any() for v, most in zip(parts, (24, 60, 60), strict=True)
     ):
         return {}
+    second = of_day - 100.0 * (whole // 100)
+    if not dates and not _jumps_at_minutes(of_day, 3600.0 * parts[0] + 60.0 * parts[1] + second):
+        return {}
+    times = [
+        f"{int(h):02d}:{int(m):02d}:{s:09.6f}"
+        for h, m, s in zip(parts[0], parts[1], second, strict=True)
+    ]
+    out = {clocks[0]: np.array(times, dtype=object)}
+    day = columns[dates[0]].astype(np.float64) if dates else np.empty(0)
+    if not dates or not np.isfinite(day).all():
+        return out
     texts = [f"{int(d):06d}" for d in day.tolist()]
     try:
-        dates = {t: datetime.strptime(t, "%Y%m%d") for t in set(texts)}
-        sure = all(len(t) == 8 and 2000 <= d.year <= 2045 for t, d in dates.items())
+        known = {t: datetime.strptime(t, "%Y%m%d") for t in set(texts)}
+        sure = all(len(t) == 8 and 2000 <= d.year <= 2045 for t, d in known.items())
     except ValueError:
         sure = False
-    times = [
-        f"{int(h):02d}:{int(m):02d}:{second:09.6f}"
-        for h, m, second in zip(parts[0], parts[1], of_day - 100.0 * (whole // 100), strict=True)
-    ]
     # A text of digits is no clock.
-    days = [f"{dates[t]:%Y-%m-%d}" if sure else t for t in texts]
-    return {clock: np.array(times, dtype=object), date: np.array(days, dtype=object)}
+    days = [f"{known[t]:%Y-%m-%d}" if sure else t for t in texts]
+    return {**out, dates[0]: np.array(days, dtype=object)}
+
+
+def _jumps_at_minutes(digits: NDArray[np.float64], seconds: NDArray[np.float64]) -> bool:
+    """Whether stamps are even as a time of day, and as numbers at full minutes alone not."""
+    if digits.size < 3:
+        return False
+    steps, jumps = np.diff(seconds), np.diff(digits)
+    usual = float(np.median(jumps))
+    odd = np.abs(jumps - usual) > 0.5 * usual
+    even = np.abs(steps - usual) <= 0.5 * usual
+    return usual > 0.0 and bool(odd.any() and even[odd].all() and not (odd & ~even).any())
 
 
 def _says(name: str, word: str) -> bool:
     """Whether a name is a word, alone or with UTC beside it: DATE, utc_time."""
-    said = re.sub(r"[\W_]|utc|gps|gmt", "", name.lower())
-    return said in (word, word * 2) or said in {"date": ("datum", "day"), "time": ("hhmmss",)}[word]
+    more = {"date": ("datum", "day", "fecha"), "time": ("hhmmss", "hora", "uhrzeit", "zeit")}
+    plain = re.sub(r"[\W_]", "", name.lower())
+    said = re.sub("utc|gps|gmt", "", plain)
+    return said in (word, word * 2, *more[word]) or (word == "time" and plain in ("utc", "gmt"))
 
 
 # Lines, fields and numbers.

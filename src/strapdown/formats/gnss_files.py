@@ -216,7 +216,25 @@ def _refuse_zone_open(raw: RawLog, found: dict[str, Found], values: Callable[[st
     raise raw.fault("io.utm-zone-open", of, east=east, north=north)
 
 
+#: Height above which nothing flies in air, m.
+_HIGHEST = 1e5
+
+
 def _height(found: dict[str, Found], values: Callable[[str], Array], raw: RawLog) -> Array:
+    for quantity in _HEIGHTS:
+        one = found.get(quantity)
+        heights = values(quantity) if one is not None and not one.stated else np.empty(0)
+        known = heights[np.isfinite(heights)]
+        if one is not None and known.size and float(np.median(np.abs(known))) > _HIGHEST:
+            raise raw.fault(
+                "io.height-too-large",
+                quantity,
+                of_what=quantity,
+                source=one.source,
+                height=float(known[0]),
+                flags=f"--gnss-units {quantity}=mm",
+                keys=f'units = {{{quantity} = "mm"}}',
+            )
     if "alt_msl" not in found or "geoid" not in found:
         return values(next(q for q in _HEIGHTS if q in found))
     raw.note(
@@ -344,6 +362,7 @@ def _refuse_unit_of_speed(
         ratio=1.0 / ratio,
         unit=unit,
         name=names[0],
+        python="{" + ", ".join(f'"{q}": "{u}"' for q, u in answer.items()) + "}",
         flags="--gnss-units " + ",".join(f"{q}={u}" for q, u in answer.items()),
         keys="units = {" + ", ".join(f'{q} = "{u}"' for q, u in answer.items()) + "}",
     )

@@ -368,3 +368,93 @@ def test_a_list_that_is_the_member_of_an_object(tmp_path):
     np.testing.assert_array_equal(got.index, STAMPS)
     np.testing.assert_allclose(got["lat"], LAT, rtol=0, atol=0.51e-7)
     assert (got["alt"] == 120.0).all()
+
+
+# What a second reader of the first version found read wrong in silence.
+
+
+@pytest.mark.parametrize("name", ["time", "UTC", "utc_time", "Zeit"])
+@pytest.mark.parametrize("form", ["{h:02d}{m:02d}{s:02d}", "{h:02d}{m:02d}{s:02d}.00"])
+def test_a_time_of_day_of_digits_without_a_date(tmp_path, name, form):
+    """It crosses a full hour; as a number it would jump by 4,040 s there."""
+    seconds = 9 * 3600 + 59 * 60 + 10 + np.arange(COUNT)
+    rows = [
+        f"{form.format(h=s // 3600, m=s // 60 % 60, s=s % 60)},{LAT[k]:.6f},{LON[k]:.6f},{ALT}"
+        for k, s in enumerate(seconds.tolist())
+    ]
+    got = fixes(table(tmp_path, f"{name},lat,lon,alt", rows))
+    np.testing.assert_array_equal(got.index, seconds)
+
+
+def test_seconds_with_a_gap_stay_seconds(tmp_path):
+    seconds = np.r_[np.arange(40.0), np.arange(100.0, 140.0)]
+    rows = [f"{s},{LAT[k]:.6f},{LON[k]:.6f},{ALT}" for k, s in enumerate(seconds)]
+    got = fixes(table(tmp_path, "time,lat,lon,alt", rows))
+    np.testing.assert_array_equal(got.index, seconds)
+
+
+@pytest.mark.parametrize(
+    ("south", "west"), [("South", "West"), ("Sur", "Oeste"), ("sud", "OUEST"), ("s", "w")]
+)
+def test_hemispheres_in_words(tmp_path, south, west):
+    rows = [f"{k},{LAT[k]:.6f},{south},{LON[k]:.6f},{west},{ALT}" for k in range(COUNT)]
+    got = fixes(table(tmp_path, "time,lat,ns,lon,ew,alt", rows))
+    np.testing.assert_allclose(got[["lat", "lon"]], -np.column_stack([LAT, LON]), atol=1e-6)
+
+
+def test_the_letter_o_is_east_or_west(tmp_path):
+    rows = [f"{k},{LAT[k]:.6f},S,{LON[k]:.6f},O,{ALT}" for k in range(COUNT)]
+    with pytest.raises(DataError, check=coded("io.hemisphere-open", quantity="lon")):
+        fixes(table(tmp_path, "time,lat,ns,lon,ew,alt", rows))
+    rows = [r.replace(",O,", ",E,") if k else r for k, r in enumerate(rows)]
+    got = fixes(table(tmp_path, "time,lat,ns,lon,ew,alt", rows))
+    assert np.sign(got["lon"]).tolist() == [-1.0] + [1.0] * (COUNT - 1)
+
+
+@pytest.mark.parametrize(
+    ("lat", "lon", "signs"),
+    [
+        ("lat (S)", "longitude (W)", (-1, -1)),
+        ("Latitude N", "Longitude W", (1, -1)),
+        ("lat_N", "lon_E", (1, 1)),
+    ],
+)
+def test_hemispheres_in_names(tmp_path, lat, lon, signs):
+    rows = [f"{k},{LAT[k]:.6f},{LON[k]:.6f},{ALT}" for k in range(COUNT)]
+    got = fixes(table(tmp_path, f"time,{lat},{lon},alt", rows))
+    expected = np.column_stack([signs[0] * LAT, signs[1] * LON])
+    np.testing.assert_allclose(got[["lat", "lon"]], expected, atol=1e-6)
+
+
+def test_longitudes_that_go_round(tmp_path):
+    rows = [f"{k},{LAT[k]:.6f},{360.0 - 105.2 + 1e-4 * k:.6f},{ALT}" for k in range(COUNT)]
+    got = fixes(table(tmp_path, "time,lat,lon,alt", rows))
+    np.testing.assert_allclose(got["lat"], LAT, atol=1e-6)
+    np.testing.assert_allclose(got["lon"], -105.2 + 1e-4 * np.arange(COUNT), atol=1e-6)
+
+
+def test_whole_numbers_that_may_be_of_1e_6_deg_are_asked_about(tmp_path):
+    rows = [f"{k},{round(1e6 * LAT[k])},{round(1e6 * LON[k])},120500" for k in range(COUNT)]
+    with pytest.raises(DataError, check=coded("io.coordinate-scale-open")):
+        fixes(table(tmp_path, "time,lat,lon,alt", rows))
+
+
+def test_a_height_above_all_aircraft_is_asked_about(tmp_path):
+    rows = [f"{k},{LAT[k]:.6f},{LON[k]:.6f},1600000" for k in range(COUNT)]
+    path = table(tmp_path, "time,lat,lon,alt", rows)
+    with pytest.raises(DataError, check=coded("io.height-too-large", quantity="alt")):
+        fixes(path)
+    assert fixes(path, units={"alt": "mm"})["alt"].iloc[0] == pytest.approx(1600.0, abs=1e-9)
+
+
+def test_the_remedy_for_a_velocity_names_all_its_parts(tmp_path):
+    """Typed with one part alone, the others stayed a thousand times too large."""
+    north = 33.9 + np.arange(COUNT) * 9.4 / 111_000.0
+    east = 18.4 + np.arange(COUNT) * 12.1 / 92_300.0
+    rows = [f"{k},{north[k]:.8f},{east[k]:.8f},{ALT},9400,12100,0" for k in range(COUNT)]
+    path = table(tmp_path, "time,lat,lon,alt,vel_n,vel_e,vel_d", rows)
+    with pytest.raises(DataError, check=coded("io.speed-unit-not-stated")) as asked:
+        fixes(path)
+    answer = json.loads(str(asked.value).partition("units=")[2].partition("}")[0] + "}")
+    got = fixes(path, units=answer)
+    np.testing.assert_allclose(got[["VN", "VE"]].iloc[0], [9.4, 12.1], rtol=1e-9)
