@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.errors import DataError
 from strapdown.formats.arrays import numbers
 from strapdown.formats.find_columns import Found
 from strapdown.formats.recording import RawLog
@@ -58,11 +59,10 @@ def with_degrees(raw: RawLog, found: Mapping[str, Found]) -> RawLog:
     places = {q: changed.get(found[q].source, raw.columns[found[q].source]) for q in _ANGLES}
     if all(v.dtype.kind in "iuf" for v in places.values()):
         form, scaled = _in_one_number(places)
-        if form == "1e-7 deg" and not found["lat"].source.lower().endswith("e7"):
-            _refuse_open_scale(raw, scaled)
         changed |= {found[q].source: v for q, v in scaled.items()}
         # A name that says it (latitudeE7) says that heights are not scaled likewise.
         if form == "1e-7 deg" and not found["lat"].source.lower().endswith("e7"):
+            _refuse_open_scale(raw, scaled)
             changed |= _heights_in_mm(raw, found)
         if form:
             raw.note(
@@ -108,27 +108,32 @@ _WORDS = {
     }.items()
     for word in words.split()
 }
-#: The hemisphere at the end of a name: longitude (W), lat_N.
-_IN_NAME = re.compile(r"(?:lat|lon|lng)[a-z]*[\s_(\[]+([NSEW])[\])]?$", re.I)
+#: A hemisphere of negative angles at the end of a name: longitude (W), lat_S.
+_IN_NAME = re.compile(r"(?:lat|lon|lng)[a-z]*[\s_(\[]+([SW])[\])]?$", re.I)
+#: Names of columns of hemispheres, which need not be beside their angle.
+_OF_SIDES = re.compile(r"n/?s|e/?w|hemi|dir|ref|lat|lon|lng", re.I)
 
 
 def _sides(raw: RawLog, source: str, letters: str) -> Array | None:
-    """Return the signs by the name, or by a column of hemispheres, the nearest behind; or None.
+    """Return the signs by a column of hemispheres, the nearest behind, or by the name; or None.
 
-    DataError: a column has the letter O beside no other, which is east or west.
+    A name with S or W turns angles that have no sign of their own. DataError: a column has the
+    letter O beside no other, which is east or west.
     """
     named = _IN_NAME.search(source.strip()[-20:])
-    if named and named[1].upper() in letters:
-        return np.array(-1.0 if named[1].upper() == letters[1] else 1.0)
+    if named and named[1].upper() == letters[1]:
+        size = np.asarray(raw.columns[source])
+        return np.array(-1.0) if size.dtype.kind in "iuf" and np.nanmin(size) >= 0.0 else None
     names = list(raw.columns)
     at = names.index(source)
     for name in names[at + 1 :] + names[:at]:
-        values = raw.columns[name]
-        if values.dtype.kind != "O":
+        values, beside = raw.columns[name], abs(names.index(name) - at) == 1
+        first = str(values[0]).strip().lower() if values.dtype.kind == "O" else "no text"
+        if first not in {*_WORDS, "o", "", "none"} or not (beside or _OF_SIDES.search(name)):
             continue
         said = ["" if v is None else str(v).strip().lower() for v in values]
         there = set(said) - {""}
-        if there == {"o"} and letters == "EW" and name == names[(at + 1) % len(names)]:
+        if there == {"o"} and letters == "EW":
             raise raw.fault("io.hemisphere-open", "lon", source=name)
         known = {w: _WORDS.get(w, "W" if w == "o" and "e" in there else "") for w in there}
         if there and set(known.values()) <= set(letters):
@@ -144,7 +149,11 @@ def _in_one_number(places: Mapping[str, NDArray[Any]]) -> tuple[str, dict[str, A
         return "", {}
     if all(known[q].max() <= most for q, (most, _) in _ANGLES.items()):
         return "", {}
-    if known["lat"].max() <= 90.0 and known["lon"].max() <= 360.0 and values["lon"].min() >= 0.0:
+    if (
+        known["lat"].max() <= 90.0
+        and known["lon"].max() <= 360.0
+        and not (values["lon"] < 0.0).any()
+    ):
         turned = values["lon"] - np.where(values["lon"] > 180.0, 360.0, 0.0)
         return "degrees, longitudes from 0 to 360", {"lat": values["lat"], "lon": turned}
     if all(
@@ -182,14 +191,21 @@ def _heights_in_mm(raw: RawLog, found: Mapping[str, Found]) -> dict[str, Array]:
         if not known.size or (known % 1.0 != 0.0).any():
             continue
         if np.median(np.abs(known)) < _HIGH:
-            raise raw.fault(
-                "io.height-unit-open",
-                quantity,
-                of_what=quantity,
-                source=one.source,
-                height=float(known[0]),
-                flags=f"--gnss-units {quantity}=mm",
-                keys=f'units = {{{quantity} = "mm"}}',
-            )
+            raise height_unit_open(raw, "io.height-unit-open", quantity, one, float(known[0]))
         out[one.source] = heights * 1e-3
     return out
+
+
+def height_unit_open(
+    raw: RawLog, code: str, quantity: str, column: Found, height: float
+) -> DataError:
+    """Return the question for the unit of a column of heights, of which `height` is the first."""
+    return raw.fault(
+        code,
+        quantity,
+        of_what=quantity,
+        source=column.source,
+        height=height,
+        flags=f"--gnss-units {quantity}=mm",
+        keys=f'units = {{{quantity} = "mm"}}',
+    )

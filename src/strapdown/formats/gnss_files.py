@@ -16,7 +16,7 @@ from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, ch
 from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock
-from strapdown.formats.coordinates import with_degrees
+from strapdown.formats.coordinates import height_unit_open, with_degrees
 from strapdown.formats.find_columns import Found, fix_columns, names_of_quantities
 from strapdown.formats.gnss_fixes import (
     NOWHERE,
@@ -166,8 +166,6 @@ def _place(
 ) -> tuple[Array, str]:
     """Return geodetic positions, and the quantity of their heights."""
     local = not set(_GEODETIC) <= found.keys() and not set(_ECEF) <= found.keys()
-    if isinstance(options.origin, str) and local and not {"up", *_HEIGHTS} & found.keys():
-        raise _without_up(raw)
     if options.origin is not None and not local:
         raise ConfigError("io.origin-beside-positions", file=raw.name, quantity="origin")
     if set(_GEODETIC) <= found.keys():
@@ -189,6 +187,8 @@ def _place(
         zone, south = utm_zone(options.origin)
         level = geodetic_from_utm(values("east"), values("north"), zone, south=south)
         kind = next((q for q in _HEIGHTS if q in found), "")
+        if not kind and "up" not in found:
+            raise _without_up(raw)
         heights = _height(found, values, raw) if kind else values("up")
         return np.column_stack([level, heights]), kind or "alt"
     if "up" not in found:
@@ -226,15 +226,7 @@ def _height(found: dict[str, Found], values: Callable[[str], Array], raw: RawLog
         heights = values(quantity) if one is not None and not one.stated else np.empty(0)
         known = heights[np.isfinite(heights)]
         if one is not None and known.size and float(np.median(np.abs(known))) > _HIGHEST:
-            raise raw.fault(
-                "io.height-too-large",
-                quantity,
-                of_what=quantity,
-                source=one.source,
-                height=float(known[0]),
-                flags=f"--gnss-units {quantity}=mm",
-                keys=f'units = {{{quantity} = "mm"}}',
-            )
+            raise height_unit_open(raw, "io.height-too-large", quantity, one, float(known[0]))
     if "alt_msl" not in found or "geoid" not in found:
         return values(next(q for q in _HEIGHTS if q in found))
     raw.note(

@@ -458,3 +458,25 @@ def test_the_remedy_for_a_velocity_names_all_its_parts(tmp_path):
     answer = json.loads(str(asked.value).partition("units=")[2].partition("}")[0] + "}")
     got = fixes(path, units=answer)
     np.testing.assert_allclose(got[["VN", "VE"]].iloc[0], [9.4, 12.1], rtol=1e-9)
+
+
+def test_a_row_without_a_longitude_does_not_hide_that_they_go_round(tmp_path):
+    rows = [f"{k},{LAT[k]:.6f},{254.8 + 1e-4 * k:.6f},{ALT}" for k in range(COUNT)]
+    rows[7] = f"7,{LAT[7]:.6f},,{ALT}"
+    got = fixes(table(tmp_path, "time,lat,lon,alt", rows), repair=True)
+    assert len(got) == COUNT - 1
+    np.testing.assert_allclose(got["lat"], np.delete(LAT, 7), atol=1e-6)
+
+
+@pytest.mark.parametrize(("lat", "lon"), [("lat_N", "lon_E"), ("lat (S)", "lon (W)")])
+def test_angles_that_have_a_sign_keep_it_whatever_their_name_says(tmp_path, lat, lon):
+    rows = [f"{k},{-LAT[k]:.6f},{-LON[k]:.6f},{ALT}" for k in range(COUNT)]
+    got = fixes(table(tmp_path, f"time,{lat},{lon},alt", rows))
+    np.testing.assert_allclose(got[["lat", "lon"]], -np.column_stack([LAT, LON]), atol=1e-6)
+
+
+def test_a_letter_of_another_column_is_no_hemisphere(tmp_path):
+    """A mode E (estimated) or N (not valid), apart from the angles, says nothing of them."""
+    rows = [f"{k},{-LAT[k]:.6f},{-LON[k]:.6f},{ALT},N,E,7" for k in range(COUNT)]
+    got = fixes(table(tmp_path, "time,lat,lon,alt,mode,state,count", rows))
+    np.testing.assert_allclose(got[["lat", "lon"]], -np.column_stack([LAT, LON]), atol=1e-6)
