@@ -94,14 +94,12 @@ def _points_with_time(log: RawLog, timed: NDArray[np.bool_]) -> RawLog:
 # else not stated: it is that over the ground, or not used.
 
 
+# An archive is a KMZ by its ending; a text is KML by what is found in it.
 detect_kml = Signs(
-    suffixes=(".kml", ".kmz", ".xml"), first=rb"\APK\x03\x04|<kml[\s>]", also=lambda p: _is_kml(p)
+    suffixes=(".kml", ".kmz", ".xml"),
+    first=rb"\APK\x03\x04|<kml[\s>]",
+    also=lambda path: path.suffix.lower() == ".kmz" or not head(path).startswith("PK"),
 )
-
-
-def _is_kml(path: Path) -> bool:
-    """Whether an archive is a KMZ by its ending; a text is KML by what was found in it."""
-    return path.suffix.lower() == ".kmz" or not head(path).startswith("PK")
 
 
 def read_kml_fixes(path: Path) -> RawLog:

@@ -26,21 +26,8 @@ def table(path: Path) -> dict[str, Any]:
     """
     try:
         with path.open("rb") as begin:
-            if begin.read(6) == b"ARROW1":
-                return _of_feather(path)
-        # Otherwise all of the file is in memory before the first number is decoded.
-        with pq.ParquetFile(path, pre_buffer=False, buffer_size=BUFFER) as file:
-            rows, width = file.metadata.num_rows, max(file.metadata.num_columns, 1)
-            refuse_lie(rows * width * 8, path.stat().st_size, "table", path.name)
-            refuse_total(rows * width * 8, path)
-            if width > MOST_COLUMNS:
-                raise DataError(
-                    "io.too-many-columns-of-table", file=path.name, count=width, most=MOST_COLUMNS
-                )
-            schema, numbers = file.schema_arrow, _numbers(file, rows)
-            found = {**(numbers or {})}
-            if numbers is None:
-                schema, found = _arrays(file.read(use_threads=False))
+            feather = begin.read(6) == b"ARROW1"
+        schema, found = (_of_feather if feather else _of_parquet)(path)
         meta = {_text(k): _text(v) for k, v in (schema.metadata or {}).items()}
         units = _units(schema)
         pa.default_memory_pool().release_unused()
@@ -70,20 +57,32 @@ def _arrays(held: pa.Table) -> tuple[pa.Schema, dict[str, np.ndarray[Any, Any]]]
     return schema, found
 
 
-def _of_feather(path: Path) -> dict[str, Any]:
+def _of_parquet(path: Path) -> tuple[pa.Schema, dict[str, np.ndarray[Any, Any]]]:
+    # Otherwise all of the file is in memory before the first number is decoded.
+    with pq.ParquetFile(path, pre_buffer=False, buffer_size=BUFFER) as file:
+        rows, width = file.metadata.num_rows, max(file.metadata.num_columns, 1)
+        refuse_lie(rows * width * 8, path.stat().st_size, "table", path.name)
+        refuse_total(rows * width * 8, path)
+        _refuse_wide(width, path)
+        numbers = _numbers(file, rows)
+        if numbers is None:
+            return _arrays(file.read(use_threads=False))
+        return file.schema_arrow, dict(numbers)
+
+
+def _of_feather(path: Path) -> tuple[pa.Schema, dict[str, np.ndarray[Any, Any]]]:
     """Read a table of Feather, version 2: a file of Arrow."""
     with pa.OSFile(str(path)) as source:
         reader = pa.ipc.open_file(source)
-        if len(reader.schema) > MOST_COLUMNS:
-            raise DataError(
-                "io.too-many-columns-of-table",
-                file=path.name,
-                count=len(reader.schema),
-                most=MOST_COLUMNS,
-            )
-        schema, arrays = _arrays(reader.read_all())
-    meta = {_text(k): _text(v) for k, v in (schema.metadata or {}).items()}
-    return {"arrays": arrays, "units": _units(schema), "meta": meta}
+        _refuse_wide(len(reader.schema), path)
+        return _arrays(reader.read_all())
+
+
+def _refuse_wide(width: int, path: Path) -> None:
+    if width > MOST_COLUMNS:
+        raise DataError(
+            "io.too-many-columns-of-table", file=path.name, count=width, most=MOST_COLUMNS
+        )
 
 
 def with_bytes(path: Path) -> dict[str, Any]:
