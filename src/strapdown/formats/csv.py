@@ -180,7 +180,7 @@ def _numbered(text: str, name: str = "") -> tuple[Lines, list[str]]:
     return numbered, comments
 
 
-# Lines that are rows in another form.
+# Lines that a program prints: of every sample the same words, with other numbers between them.
 
 
 #: Time of arrival that the serial monitor of a development environment puts before a line.
@@ -189,27 +189,32 @@ _ARRIVAL = re.compile(r"(\d\d:\d\d:\d\d\.\d+) -> ?")
 _SENTENCE = re.compile(r"(\$\w+)(,[^*]*)\*[0-9A-Fa-f]{2}\s*")
 # "IMU: 20, 0.1, …": one word before the numbers of every row.
 _TAGGED = re.compile(r"\s*([A-Za-z]\w*):[ \t]*(?=[+-]?[\d.][^:=]*$)")
-# "ax: 0.12 g," or "ax = 0.12": a name, its value, and its unit where a sign ends the field.
-_PLAIN = r"[+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?"
-_NAME = r"[A-Za-z_][\w ./()\[\]^²³°-]{0,40}?"
-_LABELLED = re.compile(
-    rf"\s*({_NAME})\s*[:=]\s*([^\s,;|=]+)"
-    r"(?:[ \t]*([^\s\d,;|:=][^\s,;|:=]*)(?=[ \t]*[,;|]|$))?[ \t]*[,;|]?"
+# Stamps and numbers between words. A digit of a name or a unit is none, nor one whose sign may be
+# a part of the word before it.
+_DECIMAL = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+_PRINTED = re.compile(
+    r"(?<![\w.])(?:\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?(?:Z|[+-]\d\d:?\d\d)?(?![\w:])"
+    rf"|(?<![\w.^])[+-]{_DECIMAL}|(?<![\w.^+-]){_DECIMAL}|(?<!\w)[+-]?(?:nan|inf)(?!\w)",
+    re.I,
 )
-# "Accel (m/s^2): 0.31, -0.12, 9.71": a name and its three values.
-_VECTOR = re.compile(
-    rf"({_NAME})\s*[:=]\s*[\[(]?"
-    + r"\s*[,; ]\s*".join([rf"({_PLAIN})"] * 3)
-    + r"(?=\s*([\])|;]|$))"
-)
-# A number before the first name, as the stamp in "20518269: |Acc X:-0.22".
-_LEADING = re.compile(rf"\s*({_PLAIN})\s*[:,;|]\s*\|?(?=\s*[A-Za-z_])")
+# What is between the values of a vector, what ends a label, and what parts its words.
+_BETWEEN = re.compile(r"[,;/| \t-]+")
+_LABEL = re.compile(r"[^\W\d_].*[:=]\s*[\[({<]?$|[^\W\d_].*[\[({<]$", re.S)
+_MARKS_OF_PRINT = re.compile(r"([:=\[\](){}<>,;|]|\s-\s)")
+_CLOSED = re.compile(r"[\])}>\s]*")
+_FIRST_WORD = re.compile(r"([^\s,;|:=\[\](){}<>]+)(.*)", re.S)
+_TRIMMED = " \t'\"*#>-"
+#: Levels of the log of a microcontroller's framework, whose stamps are in ms: "I (5310) imu: …".
+_LEVELS = {"E", "W", "I", "D", "V"}
 #: Longest line above the rows that is understood, and of labelled values.
 LONGEST = 2000
-#: Name of a number before the first label, and of one that counts lines or is beside a clock.
+#: Name of a number before or behind all labels, and of one that is no clock.
 LEADING, COUNTED = "time", "number"
-#: Fewest labelled values of a line that is taken for a row.
-LABELS = 3
+#: Fewest values of a line that is taken for a row, and of a sample in several lines.
+LABELS, OF_SEVERAL = 3, 6
+#: Most lines of a sample.
+MOST_TURNS = 80
+Printed = tuple[tuple[str, ...], list[str]]
 
 
 def _rewritten(numbered: Lines) -> Lines:
@@ -244,8 +249,7 @@ def _rewritten(numbered: Lines) -> Lines:
         rows = _unlabelled(bare)
         by_row = {row: m[1] for m, (row, _) in zip(stamps, numbered, strict=True) if m}
         return [(row, _with_arrival(line, by_row.get(row))) for row, line in rows if line.strip()]
-    joined = one_line_a_sample(numbered)
-    return _unlabelled(numbered) if joined is numbered else joined
+    return _unlabelled(_one_line_a_sample(numbered))
 
 
 def _with_arrival(line: str, stamp: str | None) -> str:
@@ -258,52 +262,171 @@ def _with_arrival(line: str, stamp: str | None) -> str:
     return line if stamp is None else f"{stamp}{separator or ' '}{line.lstrip()}"
 
 
-def _unlabelled(numbered: Lines) -> Lines:
-    """Return lines of labelled values as rows under their labels."""
-    usual = Counter(
-        names for _, line in numbered[:SEARCHED] if (names := _labels(line)[0])
-    ).most_common(1)
-    if not usual or 2 * usual[0][1] <= len(numbered[:SEARCHED]):
+def _printed(line: str) -> Printed:
+    """Return the texts before, between and behind the numbers of a line, and the numbers.
+
+    Of a text the blanks at its ends are left out: a sign takes the room of one.
+    """
+    texts, values, end = [], [], 0
+    for m in _PRINTED.finditer(line) if len(line) < LONGEST else ():
+        texts.append(line[end : m.start()])
+        values.append(m[0])
+        end = m.end()
+    texts.append(line[end:])
+    return tuple(" ".join(text.split()) or text[:1] for text in texts), values
+
+
+def _one_line_a_sample(numbered: Lines) -> Lines:
+    """Join the lines of samples that are printed in several, of which each is followed by the next.
+
+    The same object if they are not.
+    """
+    keys = [_printed(line)[0] for _, line in numbered[:SEARCHED]]
+    period = next((k for k in range(1, min(MOST_TURNS, len(keys))) if keys[k] == keys[0]), 0)
+    turns = keys[:period]
+    if len(set(turns)) < 2 or len(keys) < 3 * period or len(sum(turns, ())) < period + OF_SEVERAL:
         return numbered
-    names, first = usual[0][0], True
-    stamps = [float(m[1]) for _, line in numbered[:SEARCHED] if (m := _LEADING.match(line))]
-    count = all(b - a == 1.0 for a, b in itertools.pairwise(stamps)) and names[0] == LEADING
+    regular = sum(key == turns[k % period] for k, key in enumerate(keys))
+    labels = sum(_LABEL.search(text) is not None for key in turns for text in key[:-1])
+    if 10 * regular < 9 * len(keys) or labels < 2:
+        return numbered
     out: Lines = []
+    sample: Lines = []
     for row, line in numbered:
-        said, values = _labels(line)
-        if said and said == names[: len(said)]:
-            if first:
-                out.append((row, "\t".join((COUNTED, *names[1:]) if count else names)))
-                first = False
+        key = _printed(line)[0]
+        # Where a line is lost, the sample is not whole.
+        if key == turns[0] or len(sample) == period or key != turns[len(sample)]:
+            sample = []
+        if key == turns[len(sample)]:
+            sample.append((row, line.strip()))
+        if len(sample) == period:
+            out.append((sample[0][0], "; ".join(said for _, said in sample)))
+    return out
+
+
+def _unlabelled(numbered: Lines) -> Lines:
+    """Return lines of labelled values as rows under their labels.
+
+    The same object unless most lines at the top are such.
+    """
+    top = [_printed(line) for _, line in numbered[:SEARCHED]]
+    usual = Counter(texts for texts, values in top if len(values) >= LABELS).most_common(1)
+    if not usual or 2 * usual[0][1] <= len(top):
+        return numbered
+    texts = usual[0][0]
+    names = _names(texts, [values for said, values in top if said == texts])
+    if names is None:
+        return numbered
+    out: Lines = []
+    named = False
+    for row, line in numbered:
+        said, values = _printed(line)
+        # A line that was cut has fewer values.
+        if values and (said == texts or said[: len(values)] == texts[: len(values)]):
+            if not named:
+                out.append((row, "\t".join(names)))
+                named = True
             line = "\t".join(values)
         out.append((row, line))
     return out
 
 
-def _labels(line: str) -> tuple[tuple[str, ...], list[str]]:
-    """Return labels with units, and values, of a line that has little else; or empty."""
-    if len(line) >= LONGEST:
-        return (), []
-    stamp = _LEADING.match(line)
-    line = _VECTOR.sub(_by_axis, line[stamp.end() :] if stamp else line)
-    found = _LABELLED.findall(line)
-    if len(found) < LABELS or _LABELLED.sub("", line).strip():
-        return (), []
-    names = [f"{name} [{unit}]" if unit else name for name, _, unit in found]
-    values = [value for _, value, _ in found]
-    if stamp:
-        timed = any(read_name(name).quantity == "time" for name in names)
-        names, values = [COUNTED if timed else LEADING, *names], [stamp[1], *values]
-    return tuple(names), values
+def _names(texts: tuple[str, ...], rows: list[list[str]]) -> list[str] | None:
+    """Return names of the values between some texts, with units; None if few have a label.
+
+    ``Gyro: (0.1, 0.2, 0.3) rad/s`` is a vector, ``acc {x: 1, y: 2}`` a name said once. `rows`: of
+    values between these texts.
+    """
+    # Values of one label: a text without a letter before the others.
+    runs: list[list[int]] = []
+    for k, text in enumerate(texts[:-1]):
+        same = k and _BETWEEN.fullmatch(text) and (len(runs[-1]) == 1 or text == texts[k - 1])
+        if same and any(letter.isalpha() for letter in texts[runs[-1][0]]):
+            runs[-1].append(k)
+        else:
+            runs.append([k])
+    # One value behind those that have a label each, as a stamp that ends a line.
+    if len(runs) > 1 and len(runs[-1]) == 2 and max(map(len, runs[:-1])) == 1:
+        runs.append([runs[-1].pop()])
+    labelled = sum(len(run) for run in runs if _LABEL.search(texts[run[0]]))
+    if labelled < LABELS:
+        return None
+    said: list[tuple[str, str]] = []
+    bases = [""]
+    for run in [*runs, [len(texts) - 1]]:
+        unit, label, base = _label(texts[run[0]], bases[-1])
+        # The unit behind the last axis of a name is that of all.
+        for k in reversed(range(len(said) if unit else 0)):
+            if said[k][1] or bases[k + 1] != bases[-1]:
+                break
+            said[k] = (said[k][0], unit)
+        # 0,12 may be a number with a decimal comma.
+        if len(run) % 2 == 0 and texts[run[1]] == ",":
+            return None
+        inside, own = split_brackets(label)
+        said.append((inside.strip(), own))
+        bases.append(base)
+    del said[-1]
+    timed = any(read_name(name).quantity == "time" for name, _ in said)
+    names: list[str] = []
+    for run, (name, unit) in zip(runs, said, strict=True):
+        if not name:
+            name = COUNTED if timed or not _is_clock([row[run[0]] for row in rows]) else LEADING
+            timed = timed or name == LEADING
+        elif name in _LEVELS and texts[run[0]].endswith("("):
+            name, unit, timed = LEADING, unit or "ms", True
+        ends = [""] if len(run) == 1 else " x, y, z" if len(run) == 3 else map(str, range(len(run)))
+        for end in ends.split(",") if isinstance(ends, str) else ends:
+            names.append(f"{name} {end.strip()}".strip() + (f" [{unit}]" if unit else ""))
+    return names
 
 
-def _by_axis(vector: re.Match[str]) -> str:
-    """Write three values under one name as three names with a value each."""
-    bare, unit = split_brackets(vector[1])
-    ends = [f" ({unit})" if unit else ""] * 3
-    return ", ".join(
-        f"{bare.strip()} {axis}{end}: {value}"
-        for axis, end, value in zip("xyz", ends, vector.groups()[1:4], strict=True)
+def _label(text: str, base: str) -> tuple[str, str, str]:
+    """Split a text between two numbers: the unit of the first, the label of the second, its base.
+
+    `base`: of the label before, which an axis alone continues: ``Accel X: 1, Y: 2``.
+    """
+    unit = ""
+    text = text[_CLOSED.match(text).end() :]  # type: ignore[union-attr]
+    # A label of one letter may be spelled as a unit: then nothing is between it and the number.
+    m = _FIRST_WORD.match(text)
+    found = unit_of(m[1]) if m else None
+    if m and found and (any(map(str.isalpha, m[2])) or not _LABEL.search(text)):
+        unit, text = found, m[2]
+    own = ""
+    for m in re.finditer(r"\(([^()]*(?:\([^()]*\)[^()]*)*)\)|\[([^\[\]]*)\]", text):
+        if (found := unit_of(m[1] or m[2] or "")) is not None:
+            own, text = found, text[: m.start()] + " " + text[m.end() :]
+            break
+    parts = _MARKS_OF_PRINT.split(text)
+    words = [
+        (mark, part.strip(_TRIMMED))
+        for mark, part in zip(["", *parts[1::2]], parts[::2], strict=True)
+    ]
+    words = [(mark, word) for mark, word in words if any(map(str.isalpha, word))]
+    if not words:
+        return unit, "", base
+    mark, label = words[-1]
+    if mark == "=" and " " in label:
+        label = label.rpartition(" ")[2]  # behind a value in words: host=pi ax=
+    if label.lower() in ("x", "y", "z", "w"):
+        base = words[-2][1] if len(words) > 1 else base
+        label = f"{base} {label}".strip()
+    elif label[-2:-1] == " " and label[-1] in "xX":
+        base = label[:-2]
+    else:
+        base = label
+    return unit, f"{label} [{own}]" if own else label, base
+
+
+def _is_clock(values: list[str]) -> bool:
+    """Whether values are stamps, or numbers that grow otherwise than by one a line."""
+    try:
+        steps = np.diff([float(v) for v in values])
+    except ValueError:
+        return True
+    return bool(
+        steps.size and np.all(steps >= 0.0) and np.any(steps > 0.0) and np.any(steps != 1.0)
     )
 
 
@@ -311,74 +434,7 @@ def _by_axis(vector: re.Match[str]) -> str:
 ABOVE = 4
 
 
-# Texts of serial monitors: several lines a sample, as a board prints its sensors one below the
-# other, and sentences whose fields their maker defines.
-
-
-#: Most lines of a sample, and the longest line that is understood.
-MOST_TURNS, LONGEST_LABELLED = 8, 400
-#: Fewest labelled values of a line of a sensor, and lines of sensors of a sample.
-AXES, SENSORS = 3, 2
-_DECIMAL = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
-# "Acceleration X: 0.08," and, at the end of a line, its unit: "Z: 9.83 m/s^2".
-_VALUE = re.compile(rf"\s*([A-Za-z][\w ]{{0,40}}?)\s*[:=]\s*({_DECIMAL})[ \t]*[,;|]?")
-_UNIT_BEHIND = re.compile(r"\s*([^\s\d,;|:=][^,;|:=]{0,20}?)\s*")
-
-
-def _labelled(line: str) -> tuple[tuple[str, ...], list[str]]:
-    """Return the names, with the unit at the end, and the values of a line; or its letters."""
-    values, end = [], 0
-    if len(line) <= LONGEST_LABELLED:
-        while m := _VALUE.match(line, end):
-            values.append((m[1], m[2]))
-            end = m.end()
-    rest = line[end:].strip()
-    unit = unit_of(m[1]) if (m := _UNIT_BEHIND.fullmatch(rest)) else None
-    if not values or (rest and unit is None):
-        return (re.sub(r"[^A-Za-z]", "", line[:LONGEST_LABELLED]),), []
-    # "Accel X: 1, Y: 2, Z: 3": the name is said once.
-    first, _, axis = values[0][0].rpartition(" ")
-    names = [
-        n if len(n) > 1 or not first or axis not in ("X", "x") else f"{first} {n}"
-        for n, _ in values
-    ]
-    return tuple(f"{n} [{unit}]" if unit else n for n in names), [v for _, v in values]
-
-
-def one_line_a_sample(numbered: Lines) -> Lines:
-    """Return lines of labelled values that come in turns as one row a sample, under their names.
-
-    The same object if they do not: a sample has two lines of three values at least, and each is
-    followed by the next.
-    """
-    said = [_labelled(line) for _, line in numbered[:SEARCHED]]
-    keys = [names for names, _ in said]
-    period = next(
-        (k for k in range(1, min(MOST_TURNS, len(keys) - 1) + 1) if keys[k] == keys[0]), 0
-    )
-    if period < SENSORS or len(keys) < 3 * period:
-        return numbered
-    turns = keys[:period]
-    sensors = [k for k, (_, values) in enumerate(said[:period]) if len(values) >= AXES]
-    regular = sum(key == turns[k % period] for k, key in enumerate(keys))
-    if len(sensors) < SENSORS or len(set(turns)) < period or 10 * regular < 9 * len(keys):
-        return numbered
-    held = [k for k in range(period) if said[k][1]]
-    out: Lines = [(numbered[0][0], "\t".join(name for k in held for name in turns[k]))]
-    sample: list[list[str]] = []
-    begin = 0
-    for row, line in numbered:
-        names, values = _labelled(line)
-        if names == turns[0]:
-            sample, begin = [], row
-        if len(sample) < period and names == turns[len(sample)]:
-            sample.append(values)
-        else:
-            sample = []  # a line is lost: the sample is not whole
-        if len(sample) == period:
-            out.append((begin, "\t".join(v for part in sample for v in part)))
-            sample = []
-    return out
+# Sentences whose fields their maker defines.
 
 
 _SENSED = [
@@ -496,12 +552,14 @@ class _Top:
     ) -> RawLog:
         """Make the log of these columns, with what the lines above them state."""
         # What all names begin with, as that of a device, is left out if it hides the sensors.
-        first, last = min(self.names), max(self.names)
-        same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(first, last, strict=False))
+        # A separator that ends each row makes a column without a name.
+        named = [name for name in self.names if name] or [""]
+        pairs = zip(min(named), max(named), strict=False)
+        same = itertools.takewhile(lambda pair: pair[0] == pair[1], pairs)
         shared = _SHARED.match("".join(letter for letter, _ in same))
-        if shared is not None and not any(map(_is_gyro, self.names)):
+        if shared is not None and not any(map(_is_gyro, named)):
             short = {name: name[shared.end() :] for name in self.names}
-            if all(short.values()) and sum(map(_is_gyro, short.values())) == 3:
+            if all(map(short.get, named)) and sum(map(_is_gyro, short.values())) == 3:
                 self.names = list(short.values())
                 self.units = {short[name]: unit for name, unit in self.units.items()}
         held = dict(zip(self.names, columns, strict=True))

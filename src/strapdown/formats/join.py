@@ -197,7 +197,8 @@ def _onto(
     time, stamps = in_seconds(origin, origin), in_seconds(clock, origin)
     known = np.isfinite(time)
     # Stamps without a unit are as in the log; what is said of them is in s by the likely one.
-    likely = infer_time_unit(origin.ticks[known]).value if origin.unit is None else None
+    open_unit = origin.unit is None and int(known.sum()) > 1
+    likely = infer_time_unit(origin.ticks[known]).value if open_unit else None
     factor = TIME_UNITS[str(likely)] if likely else 1.0
     stamps, values = _in_order(stamps, values, log.name, triad, findings)
     if stamps.size == time.size and np.array_equal(stamps, time):

@@ -19,7 +19,7 @@ from tests.coded import coded
 import strapdown as sd
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError
-from strapdown.formats import reader_of
+from strapdown.formats import csv, reader_of
 from strapdown.formats.arrays import nanoseconds_of
 from strapdown.formats.columns import read_name
 from strapdown.formats.find_columns import rates_and_force
@@ -63,6 +63,17 @@ def check(imu, rate=RATE, force=FORCE, *, digits=1e-4, start=None):
 
 
 # Clocks and names.
+
+
+def test_names_of_a_device_in_rows_that_end_with_a_tab(tmp_path):
+    """ConsensysPRO: a word on the separator, units below the names, a tab at each end."""
+    names = ["Timestamp_Unix", *(f"Gyro_{a}" for a in "XYZ"), *(f"Accel_LN_{a}" for a in "XYZ")]
+    rows = ["sep=\t", "".join(f"Shimmer_B5A1_{name}_CAL\t" for name in names)]
+    rows.append("\t".join(["ms", *["deg/s"] * 3, *["m/(s^2)"] * 3, ""]))
+    for k in range(N):
+        stamp = f"{1e3 * (DAY.timestamp() + T[k]):.3f}"
+        rows.append(line(stamp, *many(RATE[k] * DEG), *many(FORCE[k]), "", separator="\t"))
+    check(sd.read_imu(written(tmp_path, "shimmer.csv", rows)), start=DAY.timestamp())
 
 
 def test_a_clock_of_a_logger_in_two_columns_with_milli_g(tmp_path):
@@ -216,6 +227,48 @@ def test_a_sample_in_several_lines(tmp_path):
     del rows[4 * 700 + 1]
     imu = sd.read_imu(written(tmp_path, "monitor.txt", rows, "\r\n"), rate_hz=100.0)
     check(imu, np.delete(RATE, 700, axis=0), np.delete(FORCE, 700, axis=0))
+
+
+#: What a program prints of a sample: t in s, w in deg/s, f in m/s².
+PRINTED = {
+    "stamp with a unit": "{ms:.0f} ms  ax: {f[0]:.6f} ay: {f[1]:.6f} az: {f[2]:.6f} "
+    "gx_dps: {w[0]:.5f} gy_dps: {w[1]:.5f} gz_dps: {w[2]:.5f}",
+    "log of a framework": "I ({ms:.0f}) IMU: acc=[{f[0]:8.5f}, {f[1]:8.5f}, {f[2]:8.5f}] m/s^2 "
+    "gyro=[{w[0]:9.5f}, {w[1]:9.5f}, {w[2]:9.5f}] dps",
+    "tuples, time last": "Gyro: ({w[0]:.5f}, {w[1]:.5f}, {w[2]:.5f}) deg/s Accel: ({f[0]:.6f}, "
+    "{f[1]:.6f}, {f[2]:.6f}) m/s^2 t={t:.3f}",
+    "line protocol": "imu,host=pi ax={f[0]:.6f},ay={f[1]:.6f},az={f[2]:.6f},gx_dps={w[0]:.5f},"
+    "gy_dps={w[1]:.5f},gz_dps={w[2]:.5f} {ns:.0f}",
+    "dictionary": "{{'t': {t:.3f}, 'accel': {{'x': {f[0]:.6f}, 'y': {f[1]:.6f}, 'z': {f[2]:.6f}}}, "
+    "'gyro (deg/s)': {{'x': {w[0]:.5f}, 'y': {w[1]:.5f}, 'z': {w[2]:.5f}}}}}",
+    "message in lines": "header:\n  stamp:\n    sec: {s:.0f}\n    nanosec: {rest:.0f}\n"
+    "  frame_id: imu\nangular_velocity:\n  x: {r[0]:.7f}\n  y: {r[1]:.7f}\n  z: {r[2]:.7f}\n"
+    "angular_velocity_covariance:\n- 0.0\n- 0.0\nlinear_acceleration:\n  x: {f[0]:.6f}\n"
+    "  y: {f[1]:.6f}\n  z: {f[2]:.6f}\n---",
+}
+
+
+@pytest.mark.parametrize("form", PRINTED)
+def test_lines_as_programs_print_them(tmp_path, form):
+    rows = []
+    for k in range(N):
+        ns = 1_709_640_000_000_000_000 + round(1e9 * T[k])
+        numbers = {"t": T[k], "ms": 1e3 * T[k], "ns": ns, "s": ns // 10**9, "rest": ns % 10**9}
+        rows.append(PRINTED[form].format(**numbers, w=RATE[k] * DEG, r=RATE[k], f=FORCE[k]))
+    check(sd.read_imu(written(tmp_path, "capture.log", rows)))
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        # A sign that may be a hyphen, and a comma that may be decimal: no guess.
+        "t: {t:.3f} gx-{a:.3f} gy-{a:.3f} gz-{a:.3f} ax-{a:.3f} ay-{a:.3f} az-{a:.3f}",
+        "t: {k},{k} gx: {k},{k} gy: {k},{k} gz: {k},{k}",
+    ],
+)
+def test_printed_lines_that_may_be_read_in_two_ways_are_not(form):
+    lines = [(k, form.format(t=0.01 * k, a=0.3 + 0.01 * k, k=k)) for k in range(20)]
+    assert csv._unlabelled(lines) is lines
 
 
 def test_sentences_whose_fields_are_known(tmp_path):
