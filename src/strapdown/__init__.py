@@ -76,6 +76,7 @@ if TYPE_CHECKING:
         reconstruct_crash,
     )
     from strapdown.earth import magnetic_field
+    from strapdown.errors import ConfigError, DataError, DivergenceError, StrapdownError
     from strapdown.evaluation.trajectory_differences import (
         summarise_differences,
         trajectory_differences,
@@ -108,11 +109,14 @@ __all__ = [
     "BodyVelocity",
     "CalibrateRun",
     "CampaignRun",
+    "ConfigError",
     "CrashOptions",
     "CrashReconstruction",
     "CrashRun",
     "CrashUnit",
+    "DataError",
     "Diagnosis",
+    "DivergenceError",
     "Entry",
     "ExtrinsicsRun",
     "FineAlignment",
@@ -138,6 +142,7 @@ __all__ = [
     "SensorsRun",
     "Simulation",
     "Site",
+    "StrapdownError",
     "Streams",
     "TriadUncertainty",
     "WanderAzimuth",
@@ -211,6 +216,7 @@ load_on_first_use(
         "crash.path": "sample_paths",
         "crash.reconstruction": "CrashOptions CrashReconstruction reconstruct_crash",
         "earth": "magnetic_field",
+        "errors": "ConfigError DataError DivergenceError StrapdownError",
         "evaluation.trajectory_differences": "trajectory_differences summarise_differences",
         "formats": "read_log",
         "formats.crash_records": "read_crash_record",

@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.api.reading import ImuFile, imu_input, imu_of, imu_of_arrays
+from strapdown.api.reading import FoundTable, ImuFile, imu_input, imu_of, imu_of_arrays
 from strapdown.attitude_algorithms import AttitudeTracker, attitude_history, make_algorithm
 from strapdown.attitude_algorithms.algorithm import history_of_samples
 from strapdown.attitude_comparison.comparison import (
@@ -67,7 +67,7 @@ WEAKEST, STRONGEST = 4.9, 19.6
 REPORTED = 0.01
 
 
-class Attitude(pd.DataFrame):
+class Attitude(FoundTable):
     """Attitude by time: a DataFrame with `rotation` and `findings`.
 
     Index ``time`` in s; columns ``q_w q_x q_y q_z`` (body to north-east-down, Hamilton, scalar
@@ -118,11 +118,6 @@ class Attitude(pd.DataFrame):
         if q_nb is None:
             q_nb = self[QUATERNION].to_numpy()
         return Rotation.from_quat(np.roll(q_nb, -1, axis=1))
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """Warnings and notes."""
-        return tuple(self.attrs.get("findings", ()))
 
 
 def attitude(

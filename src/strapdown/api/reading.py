@@ -11,9 +11,12 @@ from __future__ import annotations
 import hashlib
 import math
 import os
+import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,16 +90,27 @@ class GnssFile:
         return {key: value for key, value in told.items() if value is not None}
 
 
-class _Table(pd.DataFrame):
-    """A DataFrame with the findings from reading it."""
+class FoundTable(pd.DataFrame):
+    """A DataFrame with findings, whose warnings stand below it wherever it is shown."""
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """Warnings and notes."""
         return tuple(self.attrs.get("findings", ()))
 
+    def _warnings(self) -> str:
+        return "\n".join(f"warning: {f}" for f in self.findings if f.severity == "warning")
 
-class Imu(_Table):
+    def __repr__(self) -> str:
+        return "\n".join(part for part in (super().__repr__(), self._warnings()) if part)
+
+    def _repr_html_(self) -> str | None:
+        # Notebooks ask for it; the stubs of pandas do not have it.
+        table, said = super()._repr_html_(), self._warnings()  # type: ignore[misc]
+        return table if table is None or not said else f"{table}<pre>{escape(said)}</pre>"
+
+
+class Imu(FoundTable):
     """Samples of an inertial sensor: a DataFrame with `findings`.
 
     Index ``time`` in s; columns ``gyro_x gyro_y gyro_z`` in rad/s and, with an
@@ -141,7 +155,7 @@ class Imu(_Table):
         return out
 
 
-class GnssFixes(_Table):
+class GnssFixes(FoundTable):
     """Fixes of a satellite receiver: a DataFrame with `findings`.
 
     Index ``time`` in s; columns ``lat lon`` in deg, ``alt`` in m over the ellipsoid, ``VN VE VD``
@@ -203,7 +217,7 @@ class Streams(Mapping[str, pd.DataFrame]):
 
 
 def read_imu(
-    path: str | Path,
+    path: str | Path | pd.DataFrame,
     *,
     axes: str | None = None,
     format: str | None = None,  # noqa: A002 (the name of the option and of the key)
@@ -219,8 +233,9 @@ def read_imu(
 
     Parameters
     ----------
-    path : str or Path
-        A file of a known format, or the folder of a known recording.
+    path : str or Path, or DataFrame
+        A file of a known format, or the folder of a known recording; or a table in memory, whose
+        columns may have any names and units that those of a file may.
     axes : str, optional
         Directions of the sensor's x, y and z (``forward-left-up``), or the sensor axes that point
         forward, right, down (``x,-y,-z``); by default as stated in the file.
@@ -255,30 +270,52 @@ def read_imu(
     ConfigError
         The file does not exist, or an option does not fit it.
     """
-    _require_path(path)
     unknown = set(units or {}) - {"gyro", "accel", "time"}
     if unknown:
         raise ConfigError("api.quantity-without-unit", quantity="units", unknown=sorted(unknown)[0])
     from strapdown.config.logs import LogTable
 
-    log = specify(
-        LogTable,
-        path=str(path),
-        format=format,
-        columns=dict(columns or {}),
-        sampling=sampling,
-        rate_hz=rate_hz,
-        from_s=span_s[0],
-        to_s=span_s[1],
-        repair=repair,
-        calibration=None if calibration is None else str(calibration),
-        **{f"{quantity}_unit": unit for quantity, unit in (units or {}).items()},
-    )
-    return ImuFile(log, axes).read()
+    with _as_file(path) as (file, own):
+        log = specify(
+            LogTable,
+            path=str(file),
+            format=own or format,
+            columns=dict(columns or {}),
+            sampling=sampling,
+            rate_hz=rate_hz,
+            from_s=span_s[0],
+            to_s=span_s[1],
+            repair=repair,
+            calibration=None if calibration is None else str(calibration),
+            **{f"{quantity}_unit": unit for quantity, unit in (units or {}).items()},
+        )
+        imu = ImuFile(log, axes).read()
+    if own:
+        # Its numbers are in memory alone, and are kept with a result.
+        del imu.attrs["file"]
+    return imu
+
+
+@contextmanager
+def _as_file(source: str | Path | pd.DataFrame) -> Iterator[tuple[str | Path, str | None]]:
+    """A file, and its format if it is made of a table in memory, for its reading."""
+    source = as_frame(source)
+    if not isinstance(source, pd.DataFrame):
+        _require_path(source)
+        yield source, None
+        return
+    table = flat(source, ())
+    if table.index.name is not None or not isinstance(table.index, pd.RangeIndex):
+        table = table.reset_index(names=table.index.name or "time")
+    table.columns = [str(name) for name in table.columns]
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "table"
+        table.to_parquet(file, index=False)
+        yield file, "parquet"
 
 
 def read_gnss(
-    path: str | Path,
+    path: str | Path | pd.DataFrame,
     *,
     format: str | None = None,  # noqa: A002 (the name of the option and of the key)
     columns: Mapping[str, str] | None = None,
@@ -293,9 +330,9 @@ def read_gnss(
 
     Parameters
     ----------
-    path : str or Path
+    path : str or Path, or DataFrame
         RTKLIB .pos, NMEA 0183, a table with named columns, or another format of
-        `strapdown modules`.
+        `strapdown modules`; or a table in memory, with names and units as of a file.
     format : str, optional
         A format of `strapdown modules`; by default found by the content.
     columns : mapping of str to str, optional
@@ -324,17 +361,21 @@ def read_gnss(
     DataError, ConfigError
         The file cannot be used; the message names file, row, quantity and remedy.
     """
-    options = GnssOptions(
-        format=format,
-        columns=dict(columns or {}),
-        units=dict(units or {}),
-        datum_height=datum_height_m,
-        origin=origin,
-        position_sd=position_sd_m,
-        velocity_sd=velocity_sd_m_per_s,
-        repair=repair,
-    )
-    return _gnss(path, options)
+    with _as_file(path) as (file, own):
+        options = GnssOptions(
+            format=own or format,
+            columns=dict(columns or {}),
+            units=dict(units or {}),
+            datum_height=datum_height_m,
+            origin=origin,
+            position_sd=position_sd_m,
+            velocity_sd=velocity_sd_m_per_s,
+            repair=repair,
+        )
+        fixes = _gnss(file, options)
+    if own:
+        del fixes.attrs["file"]
+    return fixes
 
 
 def _require_path(path: Any) -> None:
@@ -438,8 +479,9 @@ def imu_input(source: Any) -> ImuFile | pd.DataFrame:
     """Samples in any form as a file still to be read, or as a checked Imu table.
 
     `source`: an unchanged Imu from `read_imu` is represented by its file. A DataFrame has the
-    columns of an Imu table, and its time in s as index or in a column ``time``. DataError: a column
-    is missing, or a value cannot be used. ConfigError: the argument is none of these.
+    columns of an Imu table, and its time in s as index or in a column ``time``; one without a gyro
+    under these names is read as `read_imu` does. DataError: a column is missing, or a value cannot
+    be used. ConfigError: the argument is none of these.
     """
     if isinstance(source, ImuFile):
         return source
@@ -497,7 +539,10 @@ def imu_of(source: Any) -> pd.DataFrame:
 
 def _imu_of(source: pd.DataFrame) -> pd.DataFrame:
     """A checked copy with only the columns of an Imu table."""
-    given = by_time(flat(source, [*GYRO, *ACCEL, "time"]))
+    given = flat(source, [*GYRO, *ACCEL, "time"])
+    if len(given.columns) and not any(name in given.columns for name in GYRO):
+        return read_imu(source)
+    given = by_time(given)
     triads = [*GYRO, *(ACCEL if ACCEL[0] in given.columns else [])]
     missing = [c for c in triads if c not in given.columns]
     if missing:

@@ -345,6 +345,8 @@ def test_arrays_in_other_units_are_doubted(algorithm, clock, unit, code):
 
 def test_a_table_in_place_of_a_path_is_said_to_need_no_reading():
     table = pd.DataFrame({"gyro_x": [0.0]})
-    for read in (sd.read_imu, sd.read_gnss, sd.read):
-        with pytest.raises(ConfigError, check=coded("api.table-for-path", kind="DataFrame")):
-            read(table)
+    with pytest.raises(ConfigError, check=coded("api.table-for-path", kind="DataFrame")):
+        sd.read(table)
+    for read in (sd.read_imu, sd.read_gnss):
+        with pytest.raises(ConfigError, check=coded("api.table-for-path", kind="ndarray")):
+            read(np.zeros((3, 7)))

@@ -86,3 +86,57 @@ def test_names_in_levels():
 def test_a_table_of_another_library():
     table = pa.table({"time": T, **{name: BASE[name].to_numpy() for name in NAMES}})
     assert end_of(table) == pytest.approx(TRUE, abs=1e-12)
+
+
+NAMED = dict(zip(NAMES, ("gx", "gy", "gz", "ax", "ay", "az"), strict=True))
+
+
+@pytest.mark.parametrize("clock", ["t", "time_ms", "index", "dates"])
+def test_a_table_of_any_names_is_read_as_a_file_of_them(tmp_path, clock):
+    """Such a table was refused, and `read_imu` took paths alone."""
+    table = BASE.rename(columns=NAMED)
+    if clock == "index":
+        table = table.set_axis(pd.Index(T, name="t"), axis=0)
+    elif clock == "dates":
+        table = table.set_axis(BEGIN + pd.to_timedelta(T, unit="s"), axis=0)
+    else:
+        table.insert(0, clock, T * (1000.0 if clock == "time_ms" else 1.0))
+    units = {"gyro": "rad/s", "accel": "m/s2"}
+    imu = sd.read_imu(table, units=units, axes="x,y,z")
+    np.testing.assert_array_equal(imu[NAMES].to_numpy(), BASE.to_numpy())
+    np.testing.assert_allclose(imu.index, T, atol=1e-9)
+    file = tmp_path / "log.csv"
+    table.to_csv(file, index=clock in ("index", "dates"), index_label="time")
+    of_file = sd.read_imu(file, units=units, axes="x,y,z")
+    np.testing.assert_array_equal(imu[NAMES], of_file[NAMES])
+    assert {f.code for f in imu.findings} == {f.code for f in of_file.findings}
+    # Without a file a result keeps the samples.
+    assert "file" not in imu.attrs
+    assert end_of(imu) == pytest.approx(TRUE, abs=1e-9)
+
+
+def test_fixes_of_any_names_in_memory():
+    seconds = np.arange(60.0)
+    table = pd.DataFrame(
+        {"utc": BEGIN + pd.to_timedelta(seconds, unit="s"), "Latitude": 47.5 + 1e-6 * seconds}
+    ).assign(Longitude=8.5, **{"Altitude (m)": 450.0})
+    fixes = sd.read_gnss(table)
+    np.testing.assert_array_equal(fixes["lat"], table["Latitude"])
+    assert fixes["alt"].iloc[0] == 450.0
+    assert "file" not in fixes.attrs
+
+
+def test_what_a_table_of_any_names_leaves_open_is_asked():
+    table = BASE.rename(columns=NAMED).assign(t=T)
+    table[["gx", "gy", "gz"]] *= 1e-4
+    with pytest.raises(DataError, match=r'units=\{"gyro": UNIT\}'):
+        sd.attitude(table)
+
+
+def test_warnings_stand_below_a_table():
+    """Rates in deg/s, which are taken as rad/s, were seen in `findings` alone."""
+    found = sd.attitude(T, 100.0 * GYRO, ACCEL)
+    assert [f.code for f in found.findings] == ["attitude.rate-implausible"]
+    for shown in (repr(found), repr(found.head(1)), found._repr_html_()):
+        assert "are usually in deg/s" in shown
+    assert "warning" not in repr(sd.attitude(T, GYRO, ACCEL))
