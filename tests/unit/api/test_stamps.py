@@ -120,7 +120,7 @@ def test_fixes_of_any_names_in_memory():
     table = pd.DataFrame(
         {"utc": BEGIN + pd.to_timedelta(seconds, unit="s"), "Latitude": 47.5 + 1e-6 * seconds}
     ).assign(Longitude=8.5, **{"Altitude (m)": 450.0})
-    fixes = sd.read_gnss(table)
+    fixes = sd.read_gnss(table, position_sd_m=2.0)
     np.testing.assert_array_equal(fixes["lat"], table["Latitude"])
     assert fixes["alt"].iloc[0] == 450.0
     assert "file" not in fixes.attrs
