@@ -194,7 +194,7 @@ _SPELLINGS = {
     "s": "s sec secs second seconds",
     "ms": "ms msec msecs millis millisecond milliseconds",
     "us": "us µs μs usec usecs micros microsecond microseconds",
-    "ns": "ns nsec nsecs nanos nanosecond nanoseconds",
+    "ns": "ns nsec nsecs nanosec nanosecs nanos nanosecond nanoseconds",
     "min": "min minutes",
     "deg": "deg ° degree degrees",
     "rad": "rad radian radians",

@@ -352,11 +352,15 @@ def _without_chip(text: str) -> tuple[str, str]:
 
 def _words_of(text: str) -> list[str]:
     """Return the words of a name, in lower case and in English where they are known."""
-    return [e for w in _HUMPS.findall(_SCRIPTS.sub(" ", text)) for e in _english(w.lower())]
+    plain = _SCRIPTS.sub(" ", without_accents(text))  # an accent parts no word: Längs
+    return [e for w in _HUMPS.findall(plain) for e in _english(w.lower())]
 
 
 def _english(word: str) -> tuple[str, ...]:
-    """Return a word in English, if it is one of `ABROAD`; Gierrate becomes yaw and rate."""
+    """Return a word in English, if it is one of `ABROAD`; Gierrate becomes yaw and rate.
+
+    Längsbeschleunigung becomes the word of `DIRECTIONS` and acceleration.
+    """
     plain = without_accents(word)
     for english, stems in ABROAD.items():
         stem = next((s for s in stems if plain.startswith(s)), "")
@@ -364,6 +368,10 @@ def _english(word: str) -> tuple[str, ...]:
             return (english, *(_english(plain[len(stem) :]) if plain != stem else ()))
         if stem:
             return (english,)
+    for stem in (name for names in DIRECTIONS.values() for name in names):
+        rest = plain.removeprefix(stem)
+        if rest not in ("", plain) and (behind := _english(rest)) != (rest,):
+            return (stem, *behind)
     return (plain,)
 
 

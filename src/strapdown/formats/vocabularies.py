@@ -149,7 +149,7 @@ APPLE = ("timeintervalsince1970",)
 #: Words of the name of a clock, beside ``time``, and words behind it in brackets.
 OF_TIME = {
     *_words("time timestamp timestamps stamp unix epoch utc gps system gmt sample logging elapsed"),
-    *_words("since start boot reboot local ros rosbag bag header rtc chip device"),
+    *_words("since start boot reboot local ros rosbag bag header rtc chip device lsl"),
 }
 TIME = Quantity((*TIMES, *CLOCKS), TIME_UNITS)
 #: Of tables of measurements, where a date stands for a clock.
