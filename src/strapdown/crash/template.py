@@ -506,6 +506,11 @@ def _told(unit: Unit) -> str:
     if not clock.unit:
         at = impact.trigger * clock.rate
         what = f"its largest impact begins near sample {at:.0f}; it has no clock"
+    elif unit.strong.candidates:
+        what = (
+            f"largest pulse at {instant(impact.trigger)} s of its clock, and its unit is not "
+            f"stated: {unit.strong.candidates}"
+        )
     elif impact.found:
         what = (
             f"impact at {instant(impact.trigger)} s of its clock, "

@@ -326,6 +326,18 @@ def test_without_a_crash_it_says_how_near_it_came(tmp_path):
     assert 3.0 < said < 8.0
 
 
+def test_without_a_unit_no_crash_is_not_said(tmp_path):
+    """In g it is one: the terminal said that none was found, in m/s²."""
+    time = np.arange(-0.05, 0.2, 0.001)
+    force = np.where((time > 0) & (time < 0.1), -25.0 * np.sin(np.pi * time / 0.1), 0.0)
+    values = np.column_stack([time, force, 0.1 * force, 0.0 * force])
+    draft, table = drafted(tmp_path, write(tmp_path / "r.csv", "t,ax,ay,az", values))
+    assert table["units"][0]["accelerometers"][0]["unit"] == "?"
+    (told,) = draft.found
+    assert "no crash" not in told
+    assert '"g" makes a peak of' in told
+
+
 def test_a_table_of_an_event_data_recorder(tmp_path):
     time = np.arange(0.0, 0.251, 0.01)
     s = np.clip(time / 0.1, 0.0, 1.0)
