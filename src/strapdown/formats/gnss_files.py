@@ -32,7 +32,7 @@ from strapdown.formats.recording import RawLog
 from strapdown.formats.trajectory_readers import EARTH
 from strapdown.formats.vocabularies import FIXES
 from strapdown.frames import geodetic_from_ecef, geodetic_from_ned, geodetic_from_utm
-from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD, height_words
 from strapdown.units import OF_TABLES, SPEEDS, TIME_UNITS, unit_of
 
 # GNSS fixes from tables with column names: text, Parquet.
@@ -93,7 +93,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         velocity_sd=velocity_sd,
         quality=_quality(raw, found, values),
         satellites=_satellites(raw),
-        heights_from=_LEVELS.get(datum, ""),
+        heights_from=_level(raw, found, datum, options),
         height_source=found[datum].source if datum in found else "",
         findings=raw.findings,
     )
@@ -119,6 +119,25 @@ def _in_units(raw: RawLog, found: dict[str, Found], units: Mapping[str, str]) ->
 _GEODETIC, _ECEF, _LOCAL = ("lat", "lon"), ("ecef_x", "ecef_y", "ecef_z"), ("north", "east")
 _HEIGHTS = ("alt", "alt_msl", "alt_take_off", "alt_unstated")
 _LEVELS = {"alt_msl": "sea", "alt_take_off": "take-off", "alt_unstated": "unstated", "": NOWHERE}
+#: Names of heights that say that they count from the ellipsoid.
+_OVER_ELLIPSOID = re.compile(r"ell|wgs|hae", re.I)
+
+
+def _level(raw: RawLog, found: dict[str, Found], kind: str, options: GnssOptions) -> str:
+    """Return the level from which heights count, of `Fixes`; ``open`` for those of a bare name.
+
+    `kind`: quantity of the heights. Computed heights, those that the user names ``alt``, and those
+    of a Gnss table (`docs/case.md`), known by the names of its standard deviations, count from the
+    ellipsoid.
+    """
+    if kind != "alt":
+        return _LEVELS[kind]
+    if raw.heights is not None:
+        return "" if raw.heights == height_words(as_stated=False) else "as stated"
+    if raw.stated or "alt" in options.columns or "alt" not in found or "alt_msl" in found:
+        return ""
+    own = all(q in found and found[q].source in (q, f"{q}_m") for q in POSITION_SD)
+    return "" if own or _OVER_ELLIPSOID.search(found["alt"].source) else "open"
 
 
 def _refuse_missing(raw: RawLog, found: dict[str, Found], *, stated: bool) -> None:

@@ -335,7 +335,7 @@ _GEODETIC: dict[str, Quantity] = {
         _words(
             "alt altitude h hgt height hell altell heightell ellipsoidalheight heightellipsoid "
             "altitudeellipsoid ellipsoidheight ellheight heightwgs84 altitudewgs84 "
-            "höhe hohe hoehe altitud altura altitudine quota hoogte высота 高度 고도"
+            "altellipsoid hae höhe hohe hoehe altitud altura altitudine quota hoogte высота 高度 고도"
         ),
         LENGTHS,
     ),
@@ -375,7 +375,9 @@ FIXES = Vocabulary(
         **_GEODETIC,
         "alt_msl": Quantity(
             _words(
-                "hmsl altmsl altitudemsl heightmsl mslaltitude mslheight orthometricheight 海拔"
+                "hmsl altmsl altitudemsl heightmsl mslaltitude mslheight orthometricheight 海拔 "
+                "msl amsl altamsl altitudeamsl altitudeabovesealevel heightabovesealevel "
+                "altitudeabovemeansealevel"
             ),
             LENGTHS,
         ),
