@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import ConfigError, DataError, Finding, add_warning
-from strapdown.formats.arrays import as_rows, numbers, ticks_of
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
+from strapdown.formats.arrays import as_rows, epoch_of, numbers, open_dates, ticks_of
 from strapdown.formats.clocks import (
     RELATIVE,
     Clock,
@@ -67,7 +67,7 @@ from strapdown.formats.vocabularies import EULERS, QUATERNIONS
 from strapdown.tables import ACCEL, GYRO, attitude_table, find_gaps, imu_of_columns
 from strapdown.tables.checks import IMPOSSIBLE_FORCE, IMPOSSIBLE_RATE, all_finite
 from strapdown.tables.on_disk import filled, let_go, room, stored
-from strapdown.units import TIME_UNITS, factor_of, parse_unit
+from strapdown.units import DATE_ORDERS, TIME_UNITS, factor_of, parse_unit
 
 Array = NDArray[np.float64]
 
@@ -104,11 +104,14 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     if not keep:
         _take_memory(log)
     let_go(values["gyro"])
+    order = options.time_unit if options.time_unit in DATE_ORDERS else None
     ticks, dated = (
-        ticks_of(raw, found["time"].source, found["time"].unit)
+        ticks_of(raw, found["time"].source, found["time"].unit, order)
         if "time" in found
         else (None, False)
     )
+    if ticks is not None and dated:
+        _report_dates(log, found["time"].source)
     even = None
     if ticks is not None and not _written_twice(ticks, values):
         even = even_stamps(ticks) or spread_bursts(ticks)
@@ -166,7 +169,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
             unit=stamps.unit,
         )
     if even is not None:
-        factor = TIME_UNITS[stamps.unit]
+        factor = factor_of(stamps.unit, TIME_UNITS)
         findings.append(even.finding(factor, file=raw.name, quantity="time"))
     clock, of_time = _clock_of_log(log, stamps, dated, int(kept[0]))
     readings = [of_time]
@@ -264,6 +267,15 @@ def _temperature(raw: RawLog, time: Array, kept: NDArray[np.int64]) -> pd.Series
     return None
 
 
+def _report_dates(log: LogInUse, source: str) -> None:
+    """Report stamps of another epoch than 1970, and dates whose day and month are open."""
+    values = log.raw.columns[source]
+    if (epoch := epoch_of(values, source)) is not None:
+        log.note("io.stamps-of-epoch", "time", source=source, epoch=epoch)
+    if log.options.time_unit not in DATE_ORDERS and (readings := open_dates(values)):
+        log.warn("io.date-order-open", "time", source=source, date=values[0], readings=readings)
+
+
 def _take_memory(log: LogInUse) -> None:
     """Put the columns of triads that were copied in place of those of the log."""
     for triad, block in log.values.items():
@@ -329,6 +341,17 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
     if not (names := [name for name in names if name not in fixes]):
         return []
     out = [Finding("io.columns-not-used", file=raw.name, severity="note", names=names)]
+    clocks = [n for n in names if _is_clock(n)]
+    if clocks and "time" in found:
+        add_note(
+            out,
+            "io.clock-of-several",
+            file=raw.name,
+            quantity="time",
+            source=found["time"].source,
+            names=clocks,
+            other=clocks[0],
+        )
     if not set(ACCEL) & set(found):
         forces = [n for n in names if read_name(n).quantity in ACCEL]
         if {read_name(n).quantity for n in forces} == set(ACCEL):
@@ -353,6 +376,12 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
                     data=data,
                 )
     return out
+
+
+def _is_clock(name: str) -> bool:
+    """Whether a name is that of a clock; a date alone is none, and a lone T is a temperature."""
+    said = read_name(name)
+    return said.quantity == "time" and said.loose < 2 and name.strip() != "T"
 
 
 def _as_accelerometer(raw: RawLog, three: list[str]) -> dict[str, Any]:
@@ -531,6 +560,10 @@ def _stamps_of_log(
         unit, why = "ns", "dates or times of day"
     elif options.time_unit:
         unit, why = parse_unit(options.time_unit, "time"), options.why("time_unit")
+        if unit in DATE_ORDERS:
+            raise ConfigError(
+                "io.unknown-unit", quantity="--time-unit", unit=unit, word=unit, known=TIME_UNITS
+            )
     elif column.basis == "file":
         why = column.why
     elif unit is None and inferred is not None and inferred.settled:
@@ -548,7 +581,7 @@ def _clock_of_log(log: LogInUse, stamps: Stamps, dated: bool, sample: int) -> tu
     if "time" not in log.found:
         return Clock(RELATIVE), Reading("(none)", "time", "s", stamps.why, 0.0)
     raw, column = log.raw, log.found["time"]
-    origin = raw.epoch + float(stamps.origin.stamp) * TIME_UNITS[stamps.origin.unit]
+    origin = raw.epoch + float(stamps.origin.stamp) * factor_of(stamps.origin.unit, TIME_UNITS)
     since = origin + float(stamps.seconds[0])
     name = raw.clock or clock_of_name(column.source, since, dated=dated)
     values = raw.columns[column.source]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.formats import comma2k19, open_stream
-from strapdown.formats.arrays import numbers
+from strapdown.formats.arrays import epoch_of, numbers, open_dates
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock
 from strapdown.formats.coordinates import height_unit_open, with_degrees
 from strapdown.formats.find_columns import Found, fix_columns, names_of_quantities
@@ -33,7 +33,7 @@ from strapdown.formats.trajectory_readers import EARTH
 from strapdown.formats.vocabularies import FIXES
 from strapdown.frames import geodetic_from_ecef, geodetic_from_ned, geodetic_from_utm
 from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD, height_words
-from strapdown.units import OF_TABLES, SPEEDS, TIME_UNITS, unit_of
+from strapdown.units import DATE_ORDERS, OF_TABLES, SPEEDS, TIME_UNITS, unit_of
 
 # GNSS fixes from tables with column names: text, Parquet.
 
@@ -67,7 +67,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         return np.column_stack([values(name) for name in names]) if there else None
 
     place, datum = _place(raw, found, values, options)
-    time, clock = _time(raw, found["time"])
+    time, clock = _time(raw, found["time"], options.units.get("time"))
     if "week" in found and clock.name == RELATIVE:
         clock = Clock(GPS)
     if "week" in found and clock.name == GPS:
@@ -107,6 +107,8 @@ def _in_units(raw: RawLog, found: dict[str, Found], units: Mapping[str, str]) ->
             raise ConfigError(
                 "io.unit-of-missing-column", file=raw.name, quantity="units", of_what=quantity
             )
+        if quantity == "time" and unit in DATE_ORDERS:
+            continue
         known = FIXES.quantities[quantity].units
         spelled = unit_of(unit, OF_TABLES) or unit
         check_choice("io.unknown-unit", known, quantity=f"units {quantity}", unit=spelled)
@@ -409,10 +411,17 @@ _DATES = (9.467e8, 2.367e9)
 _SINCE_START = 1e8
 
 
-def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
-    time, name, dated = found.stamps(raw)
+def _time(raw: RawLog, found: Found, stated: str | None) -> tuple[Array, Clock]:
+    """Return stamps, s, and their clock. `stated`: their unit or the order of dates, by the user."""
+    order = stated if stated in DATE_ORDERS else None
+    time, name, dated = found.stamps(raw, order)
+    values, source = raw.columns[found.source], found.source
+    if dated and (epoch := epoch_of(values, source)) is not None:
+        raw.note("io.stamps-of-epoch", "time", source=source, epoch=epoch)
+    if dated and order is None and (readings := open_dates(values)):
+        raw.warn("io.date-order-open", "time", source=source, date=values[0], readings=readings)
     first = float(time[np.isfinite(time)][0]) if np.isfinite(time).any() else 0.0
-    if name == UNIX and not (raw.clock or dated or found.stated) and first > 1e11:
+    if name != GPS and not (raw.clock or dated or found.stated) and first > 1e11:
         step = float(np.median(np.abs(np.diff(time)))) if time.size > 1 else np.nan
         # A receiver gives 100 fixes a second to one in two minutes: this, not the stamp, separates
         # a clock of 1970 in ms from one in ns that counts from the start of a phone.
@@ -433,7 +442,7 @@ def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
                 year=1970.0 + np.floor(first * TIME_UNITS[unit] / 31556952.0),
                 step=step * TIME_UNITS[unit],
             )
-            return time * TIME_UNITS[unit], Clock(name)
+            return time * TIME_UNITS[unit], Clock(UNIX)
         raise raw.fault(
             "io.stamp-no-date-clock-tells",
             "time",
