@@ -109,8 +109,9 @@ def nanoseconds_of(texts: Iterable[object], order: str | None = None) -> NDArray
     """Convert dates with times of day to nanoseconds since 1970, UTC where no zone is stated.
 
     `texts` ((n,)): ``2024-06-19 15:27:08.576``, ``19.06.2024 15:27:08,576``, ``06/19/2024 3:27:08
-    PM``. `order`: of their dates (`units.DATE_ORDERS`), if stated. Returns (n,), or None if one is neither, or beyond 1677 to 2262. Without a date, or where
-    day and month are ambiguous, since the midnight before the first, as `day_nanoseconds`.
+    PM``. `order`: of their dates (`units.DATE_ORDERS`), if stated. Returns (n,), or None if one is
+    neither, or beyond 1677 to 2262. Without a date, or where day and month are ambiguous, since the
+    midnight before the first, as `day_nanoseconds`.
     """
     found = _matches(texts)
     if found is None:
@@ -187,7 +188,8 @@ _YMD, _DMY, _MDY = (0, 1, 2), (2, 1, 0), (2, 0, 1)
 def _days(dates: set[str | None], order: str | None = None) -> dict[str | None, int] | None:
     """Return the days since 1970 of dates; None if they do not decide between day and month.
 
-    `order`: as stated, of `units.DATE_ORDERS`. A part above 12 decides, and so do two dates that follow each other in one order alone.
+    `order`: as stated, of `units.DATE_ORDERS`. A part above 12 decides, and so do two dates that
+    follow each other in one order alone.
     """
     if None in dates:
         return None
@@ -223,18 +225,19 @@ def _in_order(
     return out
 
 
-def open_dates(texts: NDArray[Any]) -> list[str]:
-    """Return the two readings of the first of dates whose day and month are open; empty if not."""
+def open_dates(texts: NDArray[Any]) -> dict[str, str]:
+    """Return the two readings, `first` and `second`, of a date whose day and month are open."""
     if texts.dtype.kind != "O" or (found := _matches(texts)) is None:
-        return []
+        return {}
     dates = {m["date"] for m in found}
     if None in dates or _days(dates) is not None:
-        return []
+        return {}
     year, month, day = (
         int(p) for p in (re.split(r"[./-]", str(found[0]["date"]))[k] for k in _DMY)
     )
     year += 2000 * (year < 100)
-    return [f"{year}-{month:02d}-{day:02d}", f"{year}-{day:02d}-{month:02d}"]
+    both = f"{year}-{month:02d}-{day:02d}", f"{year}-{day:02d}-{month:02d}"
+    return dict(zip(("first", "second"), both, strict=True))
 
 
 def _zone(text: str | None) -> int:

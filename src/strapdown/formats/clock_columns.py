@@ -221,16 +221,16 @@ def _components(
         months = (held["year"].astype(np.int64) - 1970) * 12 + held["month"].astype(np.int64) - 1
         days = months.astype("datetime64[M]").astype("datetime64[D]").astype(np.int64)
         days += held["day"].astype(np.int64) - 1
-        values: NDArray[Any] = (days * _DAY * 10**9 + nanoseconds).astype("datetime64[ns]")
+        stamps: NDArray[Any] = (days * _DAY * 10**9 + nanoseconds).astype("datetime64[ns]")
     else:
         fell = np.diff(nanoseconds) < -_HALF * 10**9
-        values = nanoseconds + np.concatenate([[0], np.cumsum(fell)]) * _DAY * 10**9
+        stamps = nanoseconds + np.concatenate([[0], np.cumsum(fell)]) * _DAY * 10**9
     old = [n for n in columns if n in {names[p] for p in used}]
     name = "time" if "time" not in columns else "clock time"
     if not dated:
         units[name] = "ns"
     _joined(findings, file, old, ", ".join(used))
-    return _replaced(columns, old, name, values)
+    return _replaced(columns, old, name, stamps)
 
 
 # A date and a time of day, as texts or as digits.

@@ -9,6 +9,7 @@ are rows, too.
 from __future__ import annotations
 
 import codecs
+import dataclasses
 import itertools
 import re
 from collections import Counter
@@ -27,6 +28,7 @@ from strapdown.formats.columns import UNKNOWN_WORDS, read_name, split_brackets
 from strapdown.formats.recording import RawLog, stated_by
 from strapdown.formats.signs import HEAD, Signs, first_bytes
 from strapdown.formats.text_columns import NULLS, Columns, columns_at_once, parsed
+from strapdown.formats.vocabularies import FIXES
 from strapdown.tables.on_disk import let_go
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, OF_LOGS, unit_of
 
@@ -148,6 +150,8 @@ def _line_by_line(
     numbered, comments = _numbered(text, name)
     if not numbered:
         raise DataError("io.file-holds-comments-alone" if comments else "io.file-empty", file=name)
+    if parts := _sections(numbered):
+        return _joined(parts, comments, name, files, kinds, findings)
     top = _Top(_rewritten(numbered), comments, name, kinds)
     if not top.data:
         raise DataError("io.csv-without-rows", file=name, row=numbered[0][0])
@@ -157,6 +161,91 @@ def _line_by_line(
         findings.append(several)
     columns = _parse(lines, len(top.names), top.separator, name)
     return top.log(name, files, columns, np.array(rows), findings)
+
+
+#: Fewest names of a section's columns, and most lines of text that are searched for them.
+NAMES, TEXTS = 3, 64
+
+
+def _sections(numbered: Lines) -> list[tuple[str, Lines]]:
+    """Return the sections of a text that has tables below each other, each with its own names.
+
+    Each has its title, the line of one field above the names; empty if there is just one table,
+    whose names may be repeated where logs were joined.
+    """
+    texts = [k for k, (_, line) in enumerate(numbered) if line.lstrip(" \t\"'#%[")[:1].isalpha()]
+    heads: list[tuple[int, list[str]]] = []
+    for k in texts if len(texts) <= TEXTS else ():
+        below = numbered[k + 1][1] if k + 1 < len(numbered) else ""
+        names = fields_of(numbered[k][1].strip().lstrip(_MARKS), separator_of(below))
+        row = fields_of(below, separator_of(below))
+        if len(names) == len(row) >= NAMES and are_data(row) and not are_data(names):
+            axes = {str(read_name(n).quantity)[-2:] for n in names}
+            if (
+                {"_x", "_y", "_z"} <= axes
+                or set("xyz") <= {n.lower()[:1] for n in names}
+                or {"lat", "lon"} <= {read_name(n, FIXES).quantity for n in names}
+            ):
+                heads.append((k, names))
+    if len({tuple(names) for _, names in heads}) < 2:
+        titles = {_title(numbered, k, texts) for k, _ in heads}
+        if len(heads) < 2 or len(titles) < len(heads) or "" in titles:
+            return []
+    out = []
+    for (k, _), (end, _) in itertools.pairwise([*heads, (len(numbered), [])]):
+        title = _title(numbered, k, texts)
+        body = numbered[k:end]
+        while body and (end := end - 1) in texts and end > k:
+            body = body[:-1]
+        out.append((title, body))
+    return out
+
+
+def _title(numbered: Lines, head: int, texts: Sequence[int]) -> str:
+    """Return the words of the line above names, if it is no row; or empty."""
+    if head - 1 not in texts:
+        return ""
+    return numbered[head - 1][1].strip(" \t\"'#%/;![]:,=-*")
+
+
+def _joined(
+    parts: list[tuple[str, Lines]],
+    comments: list[str],
+    name: str,
+    files: tuple[Path, ...],
+    kinds: Sequence[str],
+    findings: list[Finding],
+) -> RawLog:
+    """Read tables below each other as logs of single sensors, on the stamps of the gyro.
+
+    DataError: none of them has a gyro.
+    """
+    from strapdown.formats.join import join
+
+    logs: list[RawLog] = []
+    for title, numbered in parts:
+        top = _Top(numbered, comments, name, kinds)
+        if title and not any("_" in str(read_name(n).quantity) for n in top.names):
+            # x, y and z under the name of their sensor.
+            axes = {n: f"{title} {n}" for n in top.names if read_name(n).quantity is None}
+            top.units |= {axes[n]: u for n, u in top.units.items() if n in axes}
+            top.names = [axes.get(n, n) for n in top.names]
+        rows, lines = _whole_lines(top, True, name, findings)
+        columns = _parse(lines, len(top.names), top.separator, name)
+        logs.append(top.log(name, files, columns, np.array(rows), []))
+    if not any(_is_gyro(n) for log in logs for n in log.columns):
+        raise DataError(
+            "io.csv-sections",
+            file=name,
+            row=parts[1][1][0][0],
+            sections=[", ".join(log.columns) for log in logs],
+        )
+    add_note(findings, "io.csv-sections-joined", file=name, count=len(logs))
+    raw = join(
+        [dataclasses.replace(log, name=f"{name}/{k}") for k, log in enumerate(logs, 1)], name, files
+    )
+    raw.findings[:0] = findings
+    return raw
 
 
 def _numbered(text: str, name: str = "") -> tuple[Lines, list[str]]:

@@ -412,14 +412,14 @@ _SINCE_START = 1e8
 
 
 def _time(raw: RawLog, found: Found, stated: str | None) -> tuple[Array, Clock]:
-    """Return stamps, s, and their clock. `stated`: their unit or the order of dates, by the user."""
+    """Return stamps, s, and their clock. `stated`: their unit or the order of their dates."""
     order = stated if stated in DATE_ORDERS else None
     time, name, dated = found.stamps(raw, order)
     values, source = raw.columns[found.source], found.source
     if dated and (epoch := epoch_of(values, source)) is not None:
         raw.note("io.stamps-of-epoch", "time", source=source, epoch=epoch)
     if dated and order is None and (readings := open_dates(values)):
-        raw.warn("io.date-order-open", "time", source=source, date=values[0], readings=readings)
+        raw.warn("io.date-order-open", "time", source=source, date=values[0], **readings)
     first = float(time[np.isfinite(time)][0]) if np.isfinite(time).any() else 0.0
     if name != GPS and not (raw.clock or dated or found.stated) and first > 1e11:
         step = float(np.median(np.abs(np.diff(time)))) if time.size > 1 else np.nan

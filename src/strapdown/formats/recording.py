@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import re
 import shlex
 from collections.abc import Mapping, Sequence
@@ -238,6 +239,19 @@ class RawLog:
     def warn(self, code: str, quantity: str | None = None, **data: Any) -> None:
         """Add a warning about the file."""
         add_warning(self.findings, code, file=self.name, quantity=quantity, **data)
+
+    def backward(self) -> RawLog:
+        """Return the log with its rows in the opposite order, and a note that they were so."""
+        count = len(next(iter(self.columns.values())))
+        rows = np.arange(1, count + 1) if self.rows is None else self.rows
+        out = dataclasses.replace(
+            self,
+            columns={name: values[::-1].copy() for name, values in self.columns.items()},
+            rows=rows[::-1],
+            findings=list(self.findings),
+        )
+        out.note("io.rows-in-descending-order", "time", count=count)
+        return out
 
     def row(self, sample: int) -> int:
         """Row of a sample in the file, counted from 1."""

@@ -337,7 +337,8 @@ _GEODETIC: dict[str, Quantity] = {
         _words(
             "alt altitude h hgt height hell altell heightell ellipsoidalheight heightellipsoid "
             "altitudeellipsoid ellipsoidheight ellheight heightwgs84 altitudewgs84 "
-            "altellipsoid hae höhe hohe hoehe altitud altura altitudine quota hoogte высота 高度 고도"
+            "altellipsoid hae höhe hohe hoehe altitud altura altitudine quota hoogte высота "
+            "高度 고도"
         ),
         LENGTHS,
     ),

@@ -187,7 +187,7 @@ def test_a_date_whose_day_and_month_are_open(tmp_path):
     check(imu, None)
     said = [f for f in imu.findings if f.code == "io.date-order-open"]
     assert [f.severity for f in said] == ["warning"]
-    assert said[0].data["readings"] == ("2026-03-04", "2026-04-03")
+    assert [said[0].data[k] for k in ("first", "second")] == ["2026-03-04", "2026-04-03"]
     for order, start in (("d/m/y", UNIX), ("m/d/y", UNIX + 30 * 86_400)):
         stated = sd.read_imu(path, units={"time": order})
         check(stated, start)
