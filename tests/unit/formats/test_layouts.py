@@ -5,7 +5,14 @@ What is read is compared with what was written.
 
 from __future__ import annotations
 
+import bz2
+import gzip
+import json
+import lzma
+import zipfile
+
 import numpy as np
+import pyarrow as pa
 import pytest
 from tests.coded import coded
 
@@ -112,3 +119,89 @@ def test_a_reading_at_the_end_of_a_range_is_no_code(tmp_path):
     path = written(tmp_path, "log.csv", table(rows, "time_s,gx,gy,gz,ax,ay,az"))
     imu = sd.read_imu(path, units={"gyro": "deg/s/131", "accel": "g/16384"})
     assert len(imu) == N
+
+
+# Objects of JSON, and files that are compressed.
+
+
+def objects(names, values):
+    return [
+        dict(zip(("t_s", *names), [k / 100, *row], strict=True))
+        for k, row in enumerate(values.tolist())
+    ]
+
+
+COLUMNS = {n: [row[k] for row in ROWS] for k, n in enumerate(["time_s", *NAMES.split(",")])}
+TIME = COLUMNS["time_s"]
+UNITS = {"gyro": "rad/s", "accel": "m/s2"}
+SHAPES = {
+    "data of columns": {"data": COLUMNS},
+    "data of rows": {"header": list(COLUMNS), "rows": ROWS},
+    "rows": [list(COLUMNS), *ROWS],
+    "lists": {"gyro": objects("xyz", RATES), "accel": objects("xyz", FORCE)},
+    "named lists": {
+        "imu": objects(("gx", "gy", "gz"), RATES),
+        "force": objects(("ax", "ay", "az"), FORCE),
+    },
+    "columns of sensors": {
+        "info": "a logger",
+        "gyro": {"t_s": TIME, **dict(zip("xyz", RATES.T.tolist(), strict=True))},
+        "accel": {"t_s": TIME, **dict(zip("xyz", FORCE.T.tolist(), strict=True))},
+    },
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_shapes_of_json(tmp_path, shape):
+    path = written(tmp_path, "log.json", [json.dumps(SHAPES[shape])])
+    check(sd.read_imu(path, units=UNITS))
+
+
+def test_fixes_beside_sensors_in_json(tmp_path):
+    sd_m = {"north_sd": 1.0, "east_sd": 1.0, "down_sd": 2.0}
+    fixes = [{"time": k, "lat": 48.0 + k / 1e4, "lon": 11.0, "alt": 500, **sd_m} for k in range(9)]
+    held = {"gps": fixes, **SHAPES["lists"]}
+    path = written(tmp_path, "log.json", [json.dumps(held)])
+    check(sd.read_imu(path, units=UNITS))
+    np.testing.assert_allclose(sd.read_gnss(path)["lat"], 48.0 + np.arange(9) / 1e4)
+
+
+def zst(data):
+    sink = pa.BufferOutputStream()
+    with pa.CompressedOutputStream(sink, "zstd") as stream:
+        stream.write(data)
+    return sink.getvalue().to_pybytes()
+
+
+PACKERS = {".gz": gzip.compress, ".bz2": bz2.compress, ".xz": lzma.compress, ".zst": zst}
+
+
+@pytest.mark.parametrize("ending", PACKERS)
+def test_compressed_tables(tmp_path, ending):
+    path = tmp_path / f"log.csv{ending}"
+    packed = PACKERS[ending]("\n".join(table(ROWS)).encode() + b"\n")
+    path.write_bytes(packed)
+    imu = sd.read_imu(path)
+    check(imu)
+    assert imu.attrs["source"] == path.name
+    path.write_bytes(packed[: len(packed) // 2])
+    with pytest.raises(DataError):
+        sd.read_imu(path)
+
+
+def test_an_archive_of_one_table(tmp_path):
+    path = tmp_path / "log.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("a folder/log.csv", "\n".join(table(ROWS)) + "\n")
+        archive.writestr("__MACOSX/a folder/._log.csv", b"\0\5\26\7")
+    check(sd.read_imu(path))
+
+
+def test_a_bomb_and_an_archive_in_another_are_refused(tmp_path):
+    path = tmp_path / "log.csv.gz"
+    path.write_bytes(gzip.compress(gzip.compress(b"time_s")))
+    with pytest.raises(DataError, check=coded("io.packed-twice")):
+        sd.read_imu(path)
+    path.write_bytes(gzip.compress(b"0" * (300 << 20)))
+    with pytest.raises(DataError, check=coded("io.unpacks-too-far")):
+        sd.read_imu(path)
