@@ -13,6 +13,8 @@ Templates are those of `str.format`, and besides:
 
 * a sequence is joined by ", "; ``{names:or}``, ``{names:and}``, ``{names:;}`` join by that word or
   sign, ``{names:list}`` shows it as Python does;
+* ``{name:shell}`` quotes a name or a sequence of them for a shell; ``{columns:mapping}`` shows
+  ``a=b,c=d`` as a dictionary of Python;
 * a finding among the data gives its sentence, and ``{reason.remedy}`` its remedy;
 * ``{faults:lines}`` lists findings of one file, each on a line of its own with its location, its
   sentence and, below it, its remedy;
@@ -365,6 +367,15 @@ class _Sentence(string.Formatter):
     def format_field(self, value: Any, spec: str) -> str:
         if isinstance(value, Finding):
             return value.sentence(self._words)
+        if spec == "shell":
+            import shlex
+
+            return printable(
+                shlex.quote(",".join(value) if isinstance(value, tuple) else str(value))
+            )
+        if spec == "mapping":
+            pairs = value if isinstance(value, tuple) else str(value).split(",")
+            return printable(str(dict(pair.partition("=")[::2] for pair in pairs)))
         if isinstance(value, tuple):
             if spec == "list":
                 return str(list(value))

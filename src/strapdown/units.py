@@ -18,6 +18,7 @@ __all__ = [
     "ACCEL_SUMS",
     "ACCEL_UNITS",
     "ANGLES",
+    "DATE_ORDERS",
     "ENDINGS",
     "FACTORS",
     "FORCES",
@@ -79,6 +80,9 @@ RELATIVE_FIELDS: dict[str, float] = {"local_flux": 1.0}
 
 #: Factors to s.
 TIME_UNITS: dict[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
+
+#: Orders of day, month and year of dates, which are stated as a unit of time is.
+DATE_ORDERS = ("d/m/y", "m/d/y")
 
 #: Factors to degrees, the unit of angles in tables.
 ANGLES: dict[str, float] = {"deg": 1.0, "rad": math.degrees(1.0)}
@@ -361,7 +365,8 @@ def parse_unit(text: str, kind: str) -> str:
     """Check a unit that the user stated.
 
     `text`: a unit; for a gyro or an accelerometer also one of raw counts, as ``deg/s/131`` or
-    ``g/16384`` (counts per unit), or ``1/131 deg/s`` or ``0.061 deg/s`` (units per count). `kind`
+    ``g/16384`` (counts per unit), or ``1/131 deg/s`` or ``0.061 deg/s`` (units per count); for time
+    also one of ticks, as ``s/32768`` or ``10 us``, or an order of dates (`DATE_ORDERS`). `kind`
     ({'gyro', 'accel', 'mag', 'time'}). Returns in the spelling of this package; `factor_of` has its
     factor. ConfigError: the text is not a unit of that kind.
     """
@@ -372,9 +377,9 @@ def parse_unit(text: str, kind: str) -> str:
         "time": TIME_UNITS,
     }[kind]
     unit = _word(text)
-    if unit in known:
+    if unit in known or (kind == "time" and unit in DATE_ORDERS):
         return unit
-    counted = kind in ("gyro", "accel")
+    counted = kind in ("gyro", "accel", "time")
     scale, of = _taken_apart(text) if counted else (None, "")
     if scale is None or (unit := _word(of)) not in known:
         raise ConfigError(
@@ -382,7 +387,7 @@ def parse_unit(text: str, kind: str) -> str:
             quantity=f"--{kind}-unit",
             word=text,
             known=known,
-            example="deg/s/131" if kind == "gyro" else "g/16384",
+            example={"gyro": "deg/s/131", "accel": "g/16384", "time": "s/32768"}[kind],
         )
     counts = f"{1.0 / scale:g}"
     exact = math.isclose(float(counts) * scale, 1.0, rel_tol=1e-12)

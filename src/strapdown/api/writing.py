@@ -259,7 +259,7 @@ def _beside(path: Path, stream: str, form: str | None, axes: str | None) -> pd.D
     origin = stamps.origin
     table.attrs |= {"source": path.name, "findings": (*raw.findings, *stamps.findings)}
     table.attrs["clock_origin_stamp"] = (origin.stamp, origin.unit)
-    first = float(origin.stamp) * TIME_UNITS[origin.unit]
+    first = float(origin.stamp) * factor_of(origin.unit, TIME_UNITS)
     return with_clock(table, Clock(raw.clock or RELATIVE, first))
 
 

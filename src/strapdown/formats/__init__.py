@@ -214,6 +214,7 @@ READERS: dict[str, Reader] = {
     "kml": Reader.of(tracks, "KML track (.kml .kmz)", "kml"),
     "geojson": Reader.of(tracks, "GeoJSON with times (.geojson .json)", "geojson"),
     "dji-srt": Reader.of(tracks, "subtitles of a DJI drone (.SRT)", "dji"),
+    "packed": Reader.of(table_files, name="packed"),
     "sensor-folder": Reader.of(sensor_folder, "folder or zip of one text table a sensor"),
     "android-events": Reader.of(android_events, "log of Android sensor events, one a row"),
     "labview": Reader.of(table_files, "measurement file of LabVIEW (.lvm)", "labview"),
@@ -447,7 +448,7 @@ FOREIGN = (
     Foreign(
         "a compressed file",
         "the file in it, unpacked",
-        (b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"7z\xbc\xaf", b"Rar!", b"\x28\xb5\x2f\xfd"),
+        (b"7z\xbc\xaf", b"Rar!"),
     ),
 )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -22,9 +22,14 @@ _DATE = r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}"
 _STAMP = re.compile(
     rf"(?:(?P<date>{_DATE})(?:[T,]|[ T,] ?))?"
     r"(?P<h>\d{1,2}):(?P<m>[0-5]?\d):(?P<s>[0-5]?\d)(?:[.,:](?P<part>\d{1,9}))?"
-    r" ?(?:(?P<half>[AP])M|Z|UTC|GMT|(?P<zone>[+-]\d\d:?\d\d))?",
+    r" ?(?:(?P<half>[AP])\.? ?M\.?|Z|UTC|GMT|(?P<zone>[+-]\d\d:?\d\d))?",
     re.I,
 )
+# The basic form of ISO 8601: 20260304T091530.250Z; and minutes and seconds: 15:30.250.
+_BASIC = re.compile(
+    r"(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)((?:[.,]\d{1,9})?(?:Z|[+-]\d\d:?\d\d)?)"
+)
+_MINUTES = re.compile(r"([0-5]?\d:[0-5]\d[.,]\d{1,9})")
 # As C writes it: Wed Dec 22 21:09:46 2021.
 _MONTHS = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
 _CTIME = re.compile(
@@ -40,15 +45,25 @@ _ONLY_DATE = re.compile(_DATE)
 _DAY = 86_400 * 10**9
 # A decrease of more than half a day is midnight.
 _HALF_DAY = _DAY // 2
-# Days since 1899-12-30, as spreadsheets count them: 1982 to 2064; and a step (0.26 s) that
-# in seconds no inertial sensor has.
-_EXCEL_DAYS, _EXCEL_STEP = (30_000.0, 60_000.0), 3e-6
-_EXCEL_EPOCH = 25_569  # days from 1899-12-30 to 1970-01-01
+# Clocks that count other units from other instants, each by what a clock counts at 1970 and in one
+# second: no inertial sensor has such steps or stamps in seconds or parts of them.
+_MJD = "days of the modified Julian date"
+_EPOCHS: dict[str, tuple[float, float]] = {
+    "days since 1899-12-30, as spreadsheets": (25_569.0, 1 / 86_400),
+    "days since the year 0, as MATLAB (datenum)": (719_529.0, 1 / 86_400),
+    "days of the Julian date": (2_440_587.5, 1 / 86_400),
+    _MJD: (40_587.0, 1 / 86_400),
+    "100 ns since the year 1, as .NET": (621_355_968_000_000_000, 1e7),
+    "100 ns since 1601, as Windows": (116_444_736_000_000_000, 1e7),
+    "2^-32 s since 1900, as NTP": (2_208_988_800 * 2**32, 2.0**32),
+}
+#: 2000 to 2045, s since 1970; the most days that a step of a log has, 0.26 s.
+_YEARS, _MOST_STEP = (946_684_800, 2_366_841_600), 3e-6
 
 
 def is_day_time(field: object) -> bool:
     """Whether a field is a time of day, with seconds, without a date."""
-    return (m := _STAMP.fullmatch(str(field))) is not None and not m["date"]
+    return (m := _STAMP.fullmatch(_plain(str(field)))) is not None and not m["date"]
 
 
 def is_date(field: object) -> bool:
@@ -67,6 +82,10 @@ def _plain(field: str) -> str:
 
     The letters of another zone than UTC may be of several (EST, CST): such a text is no stamp.
     """
+    if (m := _BASIC.fullmatch(field)) is not None:
+        return f"{m[1]}-{m[2]}-{m[3]} {m[4]}:{m[5]}:{m[6]}{m[7]}"
+    if _MINUTES.fullmatch(field) is not None:
+        return f"0:{field}"
     if (m := _CTIME.fullmatch(field)) is not None:
         return f"{m[4]}-{_MONTHS.index(m[1].lower()) + 1}-{m[2]} {m[3]}"
     m = _NAMED_MONTH.match(field)
@@ -86,18 +105,19 @@ def day_nanoseconds(texts: Iterable[object]) -> NDArray[np.int64] | None:
     return None if found is None else _past_midnight(_of_day(found))
 
 
-def nanoseconds_of(texts: Iterable[object]) -> NDArray[np.int64] | None:
+def nanoseconds_of(texts: Iterable[object], order: str | None = None) -> NDArray[np.int64] | None:
     """Convert dates with times of day to nanoseconds since 1970, UTC where no zone is stated.
 
     `texts` ((n,)): ``2024-06-19 15:27:08.576``, ``19.06.2024 15:27:08,576``, ``06/19/2024 3:27:08
-    PM``. Returns (n,), or None if one is neither, or beyond 1677 to 2262. Without a date, or where
-    day and month are ambiguous, since the midnight before the first, as `day_nanoseconds`.
+    PM``. `order`: of their dates (`units.DATE_ORDERS`), if stated. Returns (n,), or None if one is
+    neither, or beyond 1677 to 2262. Without a date, or where day and month are ambiguous, since the
+    midnight before the first, as `day_nanoseconds`.
     """
     found = _matches(texts)
     if found is None:
         return None
     whole = _of_day(found)
-    days = _days({m["date"] for m in found})
+    days = _days({m["date"] for m in found}, order)
     if days is None:
         return _past_midnight(whole)
     zones = {z: _zone(z) for z in {m["zone"] for m in found}}
@@ -161,19 +181,39 @@ def _past_midnight(whole: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.asarray(whole + fell * _DAY, dtype=np.int64)
 
 
-def _days(dates: set[str | None]) -> dict[str | None, int] | None:
-    """Return the days since 1970 of dates; None if they do not decide between day and month."""
+#: Orders of day, month and year of a date: numbers of its parts.
+_YMD, _DMY, _MDY = (0, 1, 2), (2, 1, 0), (2, 0, 1)
+
+
+def _days(dates: set[str | None], order: str | None = None) -> dict[str | None, int] | None:
+    """Return the days since 1970 of dates; None if they do not decide between day and month.
+
+    `order`: as stated, of `units.DATE_ORDERS`. A part above 12 decides, and so do two dates that
+    follow each other in one order alone.
+    """
     if None in dates:
         return None
     parts = {d: [int(p) for p in re.split(r"[./-]", str(d))] for d in dates}
     if all(p[0] > 31 for p in parts.values()):
-        order = (0, 1, 2)
-    elif any("." in str(d) for d in dates) or any(p[0] > 12 for p in parts.values()):
-        order = (2, 1, 0)
-    elif any(p[1] > 12 for p in parts.values()):
-        order = (2, 0, 1)
-    else:
-        return None
+        return _in_order(parts, _YMD)
+    if order is not None:
+        return _in_order(parts, _DMY if order == "d/m/y" else _MDY)
+    if any("." in str(d) for d in dates) or any(p[0] > 12 for p in parts.values()):
+        return _in_order(parts, _DMY)
+    if any(p[1] > 12 for p in parts.values()):
+        return _in_order(parts, _MDY)
+    both = [_in_order(parts, order) for order in (_DMY, _MDY)]
+    spans = [max(d.values()) - min(d.values()) if d else math.inf for d in both]
+    if both[0] == both[1]:
+        return both[0]
+    near = [k for k, span in enumerate(spans) if span < len(dates)]
+    return both[near[0]] if len(dates) > 1 and len(near) == 1 else None
+
+
+def _in_order(
+    parts: Mapping[str | None, Sequence[int]], order: Sequence[int]
+) -> dict[str | None, int] | None:
+    """Return the days since 1970 of dates in an order of their parts; None if one is no date."""
     out: dict[str | None, int] = {}
     for text, part in parts.items():
         year, month, day = (part[k] for k in order)
@@ -185,6 +225,21 @@ def _days(dates: set[str | None]) -> dict[str | None, int] | None:
     return out
 
 
+def open_dates(texts: NDArray[Any]) -> dict[str, str]:
+    """Return the two readings, `first` and `second`, of a date whose day and month are open."""
+    if texts.dtype.kind != "O" or (found := _matches(texts)) is None:
+        return {}
+    dates = {m["date"] for m in found}
+    if None in dates or _days(dates) is not None:
+        return {}
+    year, month, day = (
+        int(p) for p in (re.split(r"[./-]", str(found[0]["date"]))[k] for k in _DMY)
+    )
+    year += 2000 * (year < 100)
+    both = f"{year}-{month:02d}-{day:02d}", f"{year}-{day:02d}-{month:02d}"
+    return dict(zip(("first", "second"), both, strict=True))
+
+
 def _zone(text: str | None) -> int:
     """Return how far a zone is ahead of UTC, in nanoseconds."""
     if text is None:
@@ -193,27 +248,48 @@ def _zone(text: str | None) -> int:
     return (-1 if text[0] == "-" else 1) * minutes * 60 * 10**9
 
 
-def excel_nanoseconds(values: NDArray[Any]) -> NDArray[np.int64] | None:
-    """Convert days as spreadsheets count them to nanoseconds since 1970; None if they are none.
+def epoch_of(values: NDArray[Any], column: str = "") -> str | None:
+    """Return the clock of `_EPOCHS` that stamps are of; None if of none.
 
-    `values` ((n,)). The step decides: as seconds, no inertial sensor would have it.
+    `values` ((n,)). `column`: its name. Stamps of 2000 to 2045 decide; of days, also the step: as
+    seconds, no inertial sensor would have it.
     """
-    low, high = _EXCEL_DAYS
-    if values.dtype.kind != "f" or values.size < 2 or not low <= values[0] <= high:
-        return None
+    if values.dtype.kind not in "iuf" or values.size < 2 or not values[0] > 36_525.0:
+        return None  # as of most logs
     if not np.isfinite(values).all():
         return None
-    steps = np.diff(values)
-    forward = steps[steps > 0.0]
-    if not (low <= values.min() and values.max() <= high and forward.size):
-        return None
-    if float(np.median(forward)) > _EXCEL_STEP:
-        return None
-    whole = np.floor(values)
-    return np.asarray(
-        (whole.astype(np.int64) - _EXCEL_EPOCH) * _DAY
-        + np.rint((values - whole) * _DAY).astype(np.int64)
-    )
+    low, high = float(values.min()), float(values.max())
+    modified = re.search(r"mjd|modified", column, re.I) is not None
+    for name, (zero, rate) in _EPOCHS.items():
+        if modified and name != _MJD:
+            continue
+        if not zero + rate * _YEARS[0] <= low <= high <= zero + rate * _YEARS[1]:
+            continue
+        if rate > 1.0:
+            return name
+        steps = np.diff(values)
+        forward = steps[steps > 0.0]
+        if values.dtype.kind == "f" and forward.size and np.median(forward) <= _MOST_STEP:
+            return name
+    return None
+
+
+def nanoseconds_of_epoch(values: NDArray[Any], epoch: str) -> NDArray[np.int64]:
+    """Convert stamps of a clock of `_EPOCHS` to nanoseconds since 1970."""
+    zero, rate = _EPOCHS[epoch]
+    if rate < 1.0:
+        whole = np.floor(values)
+        days = whole - math.floor(zero)
+        part = (values - whole) - (zero - math.floor(zero))
+        return np.asarray(days.astype(np.int64) * _DAY + np.rint(part * _DAY).astype(np.int64))
+    if values.dtype.kind == "f":
+        return np.asarray(np.rint((values - zero) / rate * 1e9).astype(np.int64))
+    if rate == 1e7:
+        return np.asarray((values.astype(np.int64) - int(zero)) * 100)
+    since = values.astype(np.uint64) - np.uint64(zero)
+    whole, part = since >> np.uint64(32), since & np.uint64(2**32 - 1)
+    ns = np.rint(part.astype(np.float64) * 2.0**-32 * 1e9).astype(np.int64)
+    return np.asarray(whole.astype(np.int64) * 10**9 + ns)
 
 
 # Numbers of columns, and named arrays of binary files.
@@ -372,9 +448,12 @@ def as_rows(parts: Sequence[NDArray[Any]]) -> NDArray[np.float64] | None:
     return rows if same and all(p.strides == (8,) for p in parts) else None
 
 
-def ticks_of(raw: RawLog, source: str, unit: str | None = None) -> tuple[NDArray[Any], bool]:
+def ticks_of(
+    raw: RawLog, source: str, unit: str | None = None, order: str | None = None
+) -> tuple[NDArray[Any], bool]:
     """Return stamps as numbers; dates and times of day as nanoseconds, and True.
 
+    `unit`: that of the column, if stated. `order`: of dates (`units.DATE_ORDERS`), if stated.
     Nanoseconds count from 1970, or, without a date, from a midnight. DataError: a stamp is
     neither, or of another kind than those before it.
     """
@@ -382,8 +461,10 @@ def ticks_of(raw: RawLog, source: str, unit: str | None = None) -> tuple[NDArray
     if values.dtype.kind == "M":
         return values.astype("datetime64[ns]").astype(np.int64), True
     if values.dtype.kind != "O":
-        days = excel_nanoseconds(values) if unit is None else None
-        return (numbers(raw, source, "time"), False) if days is None else (days, True)
+        epoch = epoch_of(values, source) if unit is None else None
+        if epoch is None:
+            return numbers(raw, source, "time"), False
+        return nanoseconds_of_epoch(values, epoch), True
     if not is_stamp(str(values[0])):
         return numbers(raw, source, "time"), False
     if re.match(r"\d{4}-\d\d-\d\d[T ]", str(values[0])):  # a hundred times faster
@@ -393,7 +474,7 @@ def ticks_of(raw: RawLog, source: str, unit: str | None = None) -> tuple[NDArray
         if not dates.isna().any() and parts.str.len().nunique() == 1:
             stamps = dates.dt.tz_localize(None).to_numpy().astype("datetime64[ns]")
             return stamps.astype(np.int64), True
-    found = nanoseconds_of(values)
+    found = nanoseconds_of(values, order)
     if found is None:
         first = next((k for k, v in enumerate(values) if nanoseconds_of([v]) is None), 0)
         raise raw.fault(

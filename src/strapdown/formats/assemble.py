@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import ConfigError, DataError, Finding, add_warning
-from strapdown.formats.arrays import as_rows, numbers, ticks_of
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
+from strapdown.formats.arrays import as_rows, epoch_of, numbers, open_dates, ticks_of
 from strapdown.formats.clocks import (
     RELATIVE,
     Clock,
@@ -66,8 +66,8 @@ from strapdown.formats.triad_units import (
 from strapdown.formats.vocabularies import EULERS, QUATERNIONS
 from strapdown.tables import ACCEL, GYRO, attitude_table, find_gaps, imu_of_columns
 from strapdown.tables.checks import IMPOSSIBLE_FORCE, IMPOSSIBLE_RATE, all_finite
-from strapdown.tables.on_disk import filled, let_go, room, stored
-from strapdown.units import TIME_UNITS, factor_of, parse_unit
+from strapdown.tables.on_disk import filled, let_go, room, step_range, stored
+from strapdown.units import DATE_ORDERS, TIME_UNITS, factor_of, parse_unit
 
 Array = NDArray[np.float64]
 
@@ -101,14 +101,24 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         findings = [f for f in findings if f.code != "io.first-of-monitors"]
     log = LogInUse(raw, options, questions, found, findings)
     values = log.values = values_of_triads(log)
+    try:
+        _take_out_codes(log)
+    except DataError as error:
+        questions.ask(error.finding, **_repair(error.finding, len(values["gyro"])))
+        questions.refuse()
     if not keep:
         _take_memory(log)
     let_go(values["gyro"])
+    order = options.time_unit if options.time_unit in DATE_ORDERS else None
     ticks, dated = (
-        ticks_of(raw, found["time"].source, found["time"].unit)
+        ticks_of(raw, found["time"].source, found["time"].unit, order)
         if "time" in found
         else (None, False)
     )
+    if ticks is not None and ticks.size > 2 and raw.truth is None and step_range(ticks)[1] < 0:
+        return assemble(raw.backward(), options, keep=keep)
+    if ticks is not None and dated:
+        _report_dates(log, found["time"].source)
     even = None
     if ticks is not None and not _written_twice(ticks, values):
         even = even_stamps(ticks) or spread_bursts(ticks)
@@ -166,7 +176,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
             unit=stamps.unit,
         )
     if even is not None:
-        factor = TIME_UNITS[stamps.unit]
+        factor = factor_of(stamps.unit, TIME_UNITS)
         findings.append(even.finding(factor, file=raw.name, quantity="time"))
     clock, of_time = _clock_of_log(log, stamps, dated, int(kept[0]))
     readings = [of_time]
@@ -264,6 +274,50 @@ def _temperature(raw: RawLog, time: Array, kept: NDArray[np.int64]) -> pd.Series
     return None
 
 
+#: Numbers that loggers and spreadsheets write for a missing value, and those among whole numbers,
+#: of which -32768 is a reading at the end of a range; so many times beyond all others of a channel.
+MISSING = (999.0, 999.25, 9999.0, 99_999.0, 999_999.0, 32_768.0, 1e20, 1e30)
+MISSING_COUNTS, BEYOND = MISSING[2:5], 4.0
+
+
+def _take_out_codes(log: LogInUse) -> None:
+    """Put NaN in place of the numbers that stand for a missing value.
+
+    DataError: there are some, and rows may not be dropped.
+    """
+    for triad, block in log.values.items():
+        codes: dict[float, NDArray[np.bool_]] = {}
+        for k in range(3):
+            channel = block[:, k]
+            for extreme in {float(channel.min()), float(channel.max())}:
+                if abs(extreme) not in MISSING:
+                    continue
+                known = channel != extreme
+                if abs(extreme) not in MISSING_COUNTS and not (channel[known] % 1 != 0).any():
+                    continue
+                rest = float(np.abs(channel[known]).max(initial=0.0))
+                if known.any() and rest * BEYOND < abs(extreme) and 2 * known.sum() > known.size:
+                    codes[extreme] = codes.get(extreme, np.zeros(len(block), bool)) | ~known
+        for code, rows in codes.items():
+            row, count = int(rows.argmax()), int(rows.sum())
+            where = {"value": code, "count": count}
+            if not log.options.repair:
+                raise log.raw.fault("io.missing-value-code", triad, sample=row, **where)
+            log.note("io.missing-values-left-out", triad, row=log.raw.row(row), **where)
+            block = np.where(block == code, np.nan, block)
+        if codes:
+            log.values[triad] = block
+
+
+def _report_dates(log: LogInUse, source: str) -> None:
+    """Report stamps of another epoch than 1970, and dates whose day and month are open."""
+    values = log.raw.columns[source]
+    if (epoch := epoch_of(values, source)) is not None:
+        log.note("io.stamps-of-epoch", "time", source=source, epoch=epoch)
+    if log.options.time_unit not in DATE_ORDERS and (readings := open_dates(values)):
+        log.warn("io.date-order-open", "time", source=source, date=values[0], **readings)
+
+
 def _take_memory(log: LogInUse) -> None:
     """Put the columns of triads that were copied in place of those of the log."""
     for triad, block in log.values.items():
@@ -295,6 +349,7 @@ def _likely_clock(raw: RawLog, found: dict[str, Column]) -> str:
 
 #: Faults of rows that `ReadOptions.repair` leaves out.
 REPAIRABLE = {
+    "io.missing-value-code",
     "io.not-finite-in-rows",
     "io.pause-impossible",
     "io.stamp-impossible",
@@ -329,6 +384,17 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
     if not (names := [name for name in names if name not in fixes]):
         return []
     out = [Finding("io.columns-not-used", file=raw.name, severity="note", names=names)]
+    clocks = [n for n in names if _is_clock(n)]
+    if clocks and "time" in found:
+        add_note(
+            out,
+            "io.clock-of-several",
+            file=raw.name,
+            quantity="time",
+            source=found["time"].source,
+            names=clocks,
+            other=clocks[0],
+        )
     if not set(ACCEL) & set(found):
         forces = [n for n in names if read_name(n).quantity in ACCEL]
         if {read_name(n).quantity for n in forces} == set(ACCEL):
@@ -353,6 +419,12 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
                     data=data,
                 )
     return out
+
+
+def _is_clock(name: str) -> bool:
+    """Whether a name is that of a clock; a date alone is none, and a lone T is a temperature."""
+    said = read_name(name)
+    return said.quantity == "time" and said.loose < 2 and name.strip() != "T"
 
 
 def _as_accelerometer(raw: RawLog, three: list[str]) -> dict[str, Any]:
@@ -399,7 +471,8 @@ def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
 
     Empty if every triad has a value in most rows, or the table has no time.
     """
-    if "time" not in found or raw.sparse:
+    clocks = _own_clocks(raw, found)
+    if ("time" not in found and not clocks) or raw.sparse:
         return []
     there: dict[str, NDArray[np.bool_]] = {}
     for triad in ("gyro", "accel", "mag"):
@@ -419,12 +492,14 @@ def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
             code = "io.left-out-linear-acceleration"
             left_out = [Finding(code, file=raw.name, quantity="accel", severity="note")]
     shares = [float(rows.mean()) for rows in there.values()]
-    if "gyro" not in there or min(shares) > 1.0 - OWN_ROWS or min(shares) == 0.0:
+    if "gyro" not in there or (min(shares) > 1.0 - OWN_ROWS and not clocks) or min(shares) == 0.0:
         return []
     rows = np.arange(1, there["gyro"].size + 1) if raw.rows is None else raw.rows
     parts = []
     for triad, keep in there.items():
-        mine = [found["time"], *(found[f"{triad}_{a}"] for a in AXES)]
+        clock = clocks[triad] if clocks else found["time"]
+        keep = keep & np.isfinite(raw.columns[clock.source]) if clocks else keep
+        mine = [clock, *(found[f"{triad}_{a}"] for a in AXES)]
         names = ["time", *(f"{triad}_{a}" for a in AXES)]
         parts.append(
             RawLog(
@@ -437,6 +512,42 @@ def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
             )
         )
     return parts
+
+
+#: A name that ends in that of a clock, behind the name of a sensor, and before a unit.
+_OWN_CLOCK = re.compile(
+    r"(?:^|.*[\s_.])(?:t|time|timestamp|stamp)(?:[\s_.\[(]*(s|sec|ms|us|ns)[\])]?)?(?: \(\d+\))?",
+    re.I,
+)
+
+
+def _own_clocks(raw: RawLog, found: dict[str, Column]) -> dict[str, Column]:
+    """Return the clock of each triad in a table of sensors side by side, each behind its own.
+
+    Empty if the triads have one clock, or clocks whose stamps do not overlap: they are of others.
+    """
+    names, usual = list(raw.columns), found.get("time")
+    clocks = [n for n in names if raw.columns[n].dtype.kind in "iuf" and _OWN_CLOCK.fullmatch(n)]
+    out: dict[str, Column] = {}
+    for triad in ("gyro", "accel", "mag"):
+        if f"{triad}_x" not in found:
+            continue
+        before = names[: names.index(found[f"{triad}_x"].source)]
+        clock = next((n for n in reversed(before) if n in clocks), None)
+        if clock is None:
+            return {}
+        match = _OWN_CLOCK.fullmatch(clock)
+        unit = (match and match[1]) or (usual.unit if usual else None)
+        out[triad] = Column(clock, unit, "name")
+    stamps = [raw.columns[c.source] for c in out.values()]
+    if len(stamps) < 2 or len({c.source for c in out.values()}) < 2:
+        return {}
+    if usual and any(np.array_equal(stamps[0], s) for s in stamps[1:]):
+        return {}
+    if any(not np.isfinite(s).any() for s in stamps):
+        return {}
+    first, last = max(map(np.nanmin, stamps)), min(map(np.nanmax, stamps))
+    return out if first < last else {}
 
 
 def require_accel(recording: Recording) -> None:
@@ -531,6 +642,10 @@ def _stamps_of_log(
         unit, why = "ns", "dates or times of day"
     elif options.time_unit:
         unit, why = parse_unit(options.time_unit, "time"), options.why("time_unit")
+        if unit in DATE_ORDERS:
+            raise ConfigError(
+                "io.unknown-unit", quantity="--time-unit", unit=unit, word=unit, known=TIME_UNITS
+            )
     elif column.basis == "file":
         why = column.why
     elif unit is None and inferred is not None and inferred.settled:
@@ -548,7 +663,7 @@ def _clock_of_log(log: LogInUse, stamps: Stamps, dated: bool, sample: int) -> tu
     if "time" not in log.found:
         return Clock(RELATIVE), Reading("(none)", "time", "s", stamps.why, 0.0)
     raw, column = log.raw, log.found["time"]
-    origin = raw.epoch + float(stamps.origin.stamp) * TIME_UNITS[stamps.origin.unit]
+    origin = raw.epoch + float(stamps.origin.stamp) * factor_of(stamps.origin.unit, TIME_UNITS)
     since = origin + float(stamps.seconds[0])
     name = raw.clock or clock_of_name(column.source, since, dated=dated)
     values = raw.columns[column.source]

@@ -37,7 +37,7 @@ from strapdown.formats.recording import Origin
 from strapdown.tables.checks import RELATIVE as RELATIVE
 from strapdown.tables.on_disk import filled, let_go, step_range
 from strapdown.tables.sample_clock import sample_clock
-from strapdown.units import TIME_UNITS
+from strapdown.units import TIME_UNITS, factor_of
 
 Array = NDArray[np.float64]
 GPS, UNIX = "gps-seconds-of-week", "unix"
@@ -69,6 +69,8 @@ _LEAPS = (
 _WORDS = {GPS: {"sow", "tow", "gpssow", "gpstow", "gpst", "gps"}, UNIX: {"unix", "utc", "unixtime"}}
 # Lower limit of Unix time (2001); no sensor has counted that long since its start.
 _MODERN = 1e9  # s
+# And upper, 2045: seconds since 1904 or 1900 are beyond it.
+EPOCH_END = 2_366_841_600.0  # s
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ def own_ns(table: pd.DataFrame) -> NDArray[np.int64]:
     stamp, unit = table.attrs.get("clock_origin_stamp") or (clock_of(table).origin, "s")
     if isinstance(stamp, int) and unit in _NS:
         return np.asarray(stamp * _NS[unit] + np.rint(time * 1e9).astype(np.int64))
-    return _nearest_ns(time + float(stamp) * TIME_UNITS[unit])
+    return _nearest_ns(time + float(stamp) * factor_of(unit, TIME_UNITS))
 
 
 def _nearest_ns(seconds: Array) -> NDArray[np.int64]:
@@ -163,7 +165,7 @@ def clock_of_name(name: str, first: float, *, dated: bool = False) -> str:
         return UNIX
     if words & _WORDS[GPS] and 0.0 <= first <= WEEK + 1.0:
         return GPS
-    return UNIX if first > _MODERN and not words & _WORDS[GPS] else RELATIVE
+    return UNIX if _MODERN < first < EPOCH_END and not words & _WORDS[GPS] else RELATIVE
 
 
 def leap_seconds(unix: Array) -> Array:
@@ -420,6 +422,8 @@ MOST_PAUSES, LONGEST_LOG = 3, 100.0 * 365.25 * 86400.0  # s
 MOST_STAMP = 1e20
 #: Most successive rows whose stamps are taken for corrupt.
 WILD_RUN = 3
+#: Ticks of clocks that no name of a unit says.
+TICKS = ("10 us", "100 us")
 # Later stamps are counted from the first: a double resolves a clock of 1970 to only 0.2 µs.
 EPOCH = 1e6  # s
 
@@ -502,7 +506,7 @@ def read_stamps(
     kept = slice(None) if keep.all() else keep
     if unit is None:
         unit, why = _evident_unit(stamps[kept], file, findings, only_seconds)
-    elif (usual := _mean_step(ticks[kept]) * TIME_UNITS[unit]) > 0 and not (
+    elif (usual := _mean_step(ticks[kept]) * factor_of(unit, TIME_UNITS)) > 0 and not (
         PLAUSIBLE_STEP[0] <= usual <= 4 * PLAUSIBLE_STEP[1]
     ):
         add_warning(
@@ -513,7 +517,7 @@ def read_stamps(
             unit=unit,
             usual=1.0 / usual,
         )
-    factor = TIME_UNITS[unit]
+    factor = factor_of(unit, TIME_UNITS)
     first = stamps[0].item()
     if origin is None:
         far = abs(first) * factor > EPOCH
@@ -531,7 +535,7 @@ def read_stamps(
     if unit == origin.unit:
         since = (first - origin.stamp) * factor
     else:
-        since = first * factor - origin.stamp * TIME_UNITS[origin.unit]
+        since = first * factor - origin.stamp * factor_of(origin.unit, TIME_UNITS)
     seconds = filled(len(ticks), lambda part: since + ticks[part] * factor)
     let_go(ticks)
     # In ordinary logs no pause is longer than the log.
@@ -725,11 +729,16 @@ def _evident_unit(
             "io.choice-of-time-unit",
             severity="note",
             unit=u,
-            rate_hz=1.0 / (usual * TIME_UNITS[u]),
+            rate_hz=1.0 / (usual * factor_of(u, TIME_UNITS)),
             share=p,
         )
         for u, p in shares.items()
         if p >= 1e-3 and usual > 0
+    ]
+    choices += [  # of counters of microcontrollers and of makers, at a rate that sensors have
+        Finding("io.choice-of-ticks", severity="note", unit=u, rate_hz=rate)
+        for u in (*TICKS, "s/32768")
+        if usual > 0 and 5.0 <= (rate := 1.0 / (usual * factor_of(u, TIME_UNITS))) <= 2e3
     ]
     raise DataError(
         "io.time-unit-undecided" if choices else "io.time-unit-of-no-step",

@@ -9,12 +9,12 @@ are rows, too.
 from __future__ import annotations
 
 import codecs
+import dataclasses
 import itertools
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
@@ -22,11 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding, add_note
-from strapdown.formats.arrays import is_date, is_day_time, is_stamp
+from strapdown.formats.arrays import is_stamp
+from strapdown.formats.clock_columns import with_one_clock
 from strapdown.formats.columns import UNKNOWN_WORDS, read_name, split_brackets
 from strapdown.formats.recording import RawLog, stated_by
 from strapdown.formats.signs import HEAD, Signs, first_bytes
 from strapdown.formats.text_columns import NULLS, Columns, columns_at_once, parsed
+from strapdown.formats.vocabularies import FIXES
 from strapdown.tables.on_disk import let_go
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, OF_LOGS, unit_of
 
@@ -148,6 +150,8 @@ def _line_by_line(
     numbered, comments = _numbered(text, name)
     if not numbered:
         raise DataError("io.file-holds-comments-alone" if comments else "io.file-empty", file=name)
+    if parts := _sections(numbered):
+        return _joined(parts, comments, name, files, kinds, findings)
     top = _Top(_rewritten(numbered), comments, name, kinds)
     if not top.data:
         raise DataError("io.csv-without-rows", file=name, row=numbered[0][0])
@@ -157,6 +161,91 @@ def _line_by_line(
         findings.append(several)
     columns = _parse(lines, len(top.names), top.separator, name)
     return top.log(name, files, columns, np.array(rows), findings)
+
+
+#: Fewest names of a section's columns, and most lines of text that are searched for them.
+NAMES, TEXTS = 3, 64
+
+
+def _sections(numbered: Lines) -> list[tuple[str, Lines]]:
+    """Return the sections of a text that has tables below each other, each with its own names.
+
+    Each has its title, the line of one field above the names; empty if there is just one table,
+    whose names may be repeated where logs were joined.
+    """
+    texts = [k for k, (_, line) in enumerate(numbered) if line.lstrip(" \t\"'#%[")[:1].isalpha()]
+    heads: list[tuple[int, list[str]]] = []
+    for k in texts if len(texts) <= TEXTS else ():
+        below = numbered[k + 1][1] if k + 1 < len(numbered) else ""
+        names = fields_of(numbered[k][1].strip().lstrip(_MARKS), separator_of(below))
+        row = fields_of(below, separator_of(below))
+        if len(names) == len(row) >= NAMES and are_data(row) and not are_data(names):
+            axes = {str(read_name(n).quantity)[-2:] for n in names}
+            if (
+                {"_x", "_y", "_z"} <= axes
+                or set("xyz") <= {n.lower()[:1] for n in names}
+                or {"lat", "lon"} <= {read_name(n, FIXES).quantity for n in names}
+            ):
+                heads.append((k, names))
+    if len({tuple(names) for _, names in heads}) < 2:
+        titles = {_title(numbered, k, texts) for k, _ in heads}
+        if len(heads) < 2 or len(titles) < len(heads) or "" in titles:
+            return []
+    out = []
+    for (k, _), (end, _) in itertools.pairwise([*heads, (len(numbered), [])]):
+        title = _title(numbered, k, texts)
+        body = numbered[k:end]
+        while body and (end := end - 1) in texts and end > k:
+            body = body[:-1]
+        out.append((title, body))
+    return out
+
+
+def _title(numbered: Lines, head: int, texts: Sequence[int]) -> str:
+    """Return the words of the line above names, if it is no row; or empty."""
+    if head - 1 not in texts:
+        return ""
+    return numbered[head - 1][1].strip(" \t\"'#%/;![]:,=-*")
+
+
+def _joined(
+    parts: list[tuple[str, Lines]],
+    comments: list[str],
+    name: str,
+    files: tuple[Path, ...],
+    kinds: Sequence[str],
+    findings: list[Finding],
+) -> RawLog:
+    """Read tables below each other as logs of single sensors, on the stamps of the gyro.
+
+    DataError: none of them has a gyro.
+    """
+    from strapdown.formats.join import join
+
+    logs: list[RawLog] = []
+    for title, numbered in parts:
+        top = _Top(numbered, comments, name, kinds)
+        if title and not any("_" in str(read_name(n).quantity) for n in top.names):
+            # x, y and z under the name of their sensor.
+            axes = {n: f"{title} {n}" for n in top.names if read_name(n).quantity is None}
+            top.units |= {axes[n]: u for n, u in top.units.items() if n in axes}
+            top.names = [axes.get(n, n) for n in top.names]
+        rows, lines = _whole_lines(top, True, name, findings)
+        columns = _parse(lines, len(top.names), top.separator, name)
+        logs.append(top.log(name, files, columns, np.array(rows), []))
+    if not any(_is_gyro(n) for log in logs for n in log.columns):
+        raise DataError(
+            "io.csv-sections",
+            file=name,
+            row=parts[1][1][0][0],
+            sections=[", ".join(log.columns) for log in logs],
+        )
+    add_note(findings, "io.csv-sections-joined", file=name, count=len(logs))
+    raw = join(
+        [dataclasses.replace(log, name=f"{name}/{k}") for k, log in enumerate(logs, 1)], name, files
+    )
+    raw.findings[:0] = findings
+    return raw
 
 
 def _numbered(text: str, name: str = "") -> tuple[Lines, list[str]]:
@@ -567,7 +656,7 @@ class _Top:
         return RawLog(
             name=name,
             files=files,
-            columns=one_clock_of_parts(held, self.units),
+            columns=with_one_clock(held, self.units, findings, name),
             rows=rows,
             units=self.units,
             triad_units=stated_units(said, held),
@@ -793,105 +882,6 @@ def _above(comments: list[str], width: int, separator: str | None) -> list[str] 
         # A remark in brackets may hold separators: "# time_s,force_N (sum of cells, zeroed)".
         names = _named(_REMARK.sub("", comments[-1]), separator, width)
     return None if names is None or any(is_data(n) for n in names) else names
-
-
-#: Ends of names of a stamp's two numbers, as ROS writes them.
-_PARTS = (("secs", "nsecs"), ("sec", "nanosec"), ("sec", "nsec"))
-
-
-def one_clock_of_parts(
-    columns: dict[str, NDArray[Any]], units: dict[str, str]
-) -> dict[str, NDArray[Any]]:
-    """Join a date and a time of day, and seconds and nanoseconds, that are two columns.
-
-    `units`: the unit of the joined column is added.
-    """
-    out = dict(columns)
-    for whole, part in _PARTS:
-        for name in [n for n in out if n == whole or n.endswith((f".{whole}", f"/{whole}"))]:
-            other = name.removesuffix(whole) + part
-            if other in out and all(columns[n].dtype.kind in "iu" for n in (name, other)):
-                out.pop(other)
-                held = columns[name].astype(np.int64) * 10**9 + columns[other]
-                one = name.removesuffix(whole)[:-1] or "stamp"
-                out = {one if n == name else n: held if n == name else c for n, c in out.items()}
-                units[one] = "ns"
-    for name, texts in _digits_of_clock(columns).items():
-        columns = {**columns, name: texts}
-        out[name] = texts
-    dates = [n for n, c in columns.items() if c.dtype.kind == "O" and is_date(c[0])]
-    times = [n for n, c in columns.items() if c.dtype.kind == "O" and is_day_time(c[0])]
-    if len(dates) == len(times) == 1 and "date" in dates[0].lower():
-        days = out.pop(dates[0])
-        out[times[0]] = np.array(
-            [
-                None if None in both else " ".join(both)
-                for both in zip(days, out[times[0]], strict=True)
-            ],
-            dtype=object,
-        )
-    return out
-
-
-def _digits_of_clock(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Return a time of day that is a number of digits, 93015.2, and a date, 20240506, as texts.
-
-    Beside a date its name is enough; alone, a time of day goes on from 59 to 100: as a number of
-    seconds it jumps by 40 more at each full minute. A date of six digits becomes none, for it
-    leaves open which of them are the year (240506 may be of 2024 or of 2006), and the time counts
-    from midnight.
-    """
-    numeric = [n for n, c in columns.items() if c.dtype.kind in "iuf"]
-    dates = [n for n in numeric if _says(n, "date")]
-    clocks = [n for n in numeric if _says(n, "time")]
-    if len(clocks) != 1 or len(dates) > 1:
-        return {}
-    of_day = columns[clocks[0]].astype(np.float64)
-    whole = np.floor(of_day)
-    parts = [whole // 10_000, whole // 100 % 100, whole % 100]
-    if not np.isfinite(of_day).all() or any(
-        (v < 0).any() or (v >= most).any() for v, most in zip(parts, (24, 60, 60), strict=True)
-    ):
-        return {}
-    second = of_day - 100.0 * (whole // 100)
-    if not dates and not _jumps_at_minutes(of_day, 3600.0 * parts[0] + 60.0 * parts[1] + second):
-        return {}
-    times = [
-        f"{int(h):02d}:{int(m):02d}:{s:09.6f}"
-        for h, m, s in zip(parts[0], parts[1], second, strict=True)
-    ]
-    out = {clocks[0]: np.array(times, dtype=object)}
-    day = columns[dates[0]].astype(np.float64) if dates else np.empty(0)
-    if not dates or not np.isfinite(day).all():
-        return out
-    texts = [f"{int(d):06d}" for d in day.tolist()]
-    try:
-        known = {t: datetime.strptime(t, "%Y%m%d") for t in set(texts)}
-        sure = all(len(t) == 8 and 2000 <= d.year <= 2045 for t, d in known.items())
-    except ValueError:
-        sure = False
-    # A text of digits is no clock.
-    days = [f"{known[t]:%Y-%m-%d}" if sure else t for t in texts]
-    return {**out, dates[0]: np.array(days, dtype=object)}
-
-
-def _jumps_at_minutes(digits: NDArray[np.float64], seconds: NDArray[np.float64]) -> bool:
-    """Whether stamps are even as a time of day, and as numbers at full minutes alone not."""
-    if digits.size < 3:
-        return False
-    steps, jumps = np.diff(seconds), np.diff(digits)
-    usual = float(np.median(jumps))
-    odd = np.abs(jumps - usual) > 0.5 * usual
-    even = np.abs(steps - usual) <= 0.5 * usual
-    return usual > 0.0 and bool(odd.any() and even[odd].all() and not (odd & ~even).any())
-
-
-def _says(name: str, word: str) -> bool:
-    """Whether a name is a word, alone or with UTC beside it: DATE, utc_time."""
-    more = {"date": ("datum", "day", "fecha"), "time": ("hhmmss", "hora", "uhrzeit", "zeit")}
-    plain = re.sub(r"[\W_]", "", name.lower())
-    said = re.sub("utc|gps|gmt", "", plain)
-    return said in (word, word * 2, *more[word]) or (word == "time" and plain in ("utc", "gmt"))
 
 
 # Lines, fields and numbers.

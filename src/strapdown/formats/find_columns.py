@@ -447,7 +447,31 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
             questions.ask(
                 _several(raw, quantity, names, names[0]), **{quantity: reference(raw, names[0])}
             )
+    if "time" not in {*found, *wanted} and (clock := clock_by_values(raw)):
+        found["time"] = clock
     return {q: Column(name, _unit_of(raw, name), "name") for q, name in found.items()}
+
+
+#: Names of counters that may be clocks, if no other column is.
+_TICKS = ("tick", "ticks", "counter", "clock", "systick", "cycles")
+
+
+def clock_by_values(raw: RawLog) -> str:
+    """Return the one column of dates or times of day, or of ticks; empty if there is not just one.
+
+    A clock of another name is known by its values.
+    """
+    dated, ticks = [], []
+    for name, values in raw.columns.items():
+        if values.dtype.kind == "M":
+            dated.append(name)
+        elif values.dtype.kind == "O":
+            if values.size and ":" in (first := str(values[0])) and is_stamp(first):
+                dated.append(name)
+        elif name.strip().lower() in _TICKS and advances(values):
+            ticks.append(name)
+    found = dated or ticks
+    return found[0] if len(found) == 1 else ""
 
 
 def _families(raw: RawLog, said: dict[str, ColumnName]) -> dict[tuple[str, str], Family]:
@@ -702,12 +726,13 @@ class Found:
         """
         return np.asarray(numbers(raw, self.source, quantity), np.float64) * self.factor
 
-    def stamps(self, raw: RawLog) -> tuple[Array, str, bool]:
+    def stamps(self, raw: RawLog, order: str | None = None) -> tuple[Array, str, bool]:
         """Return seconds, (n,), the name of their clock, and whether they were dates.
 
+        `order`: of dates (`units.DATE_ORDERS`), if stated.
         DataError: a stamp is neither a number nor a date.
         """
-        ticks, dated = ticks_of(raw, self.source)
+        ticks, dated = ticks_of(raw, self.source, order=order)
         time = np.asarray(ticks * (1e-9 if dated else self.factor), dtype=np.float64)
         finite = time[np.isfinite(time)]
         first = float(finite[0]) if finite.size else 0.0
@@ -829,7 +854,10 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
             # A lone T is as often a temperature; a text that is no stamp is no clock.
             other = {n for n in clocks if n == "T" or not is_clock(raw, n)} - set(asked.values())
             names = [n for n in names if n not in other or other >= set(clocks)]
-        return find_quantities(names, FIXES, asked, raw.name, raw.units)
+        by_name = find_quantities(names, FIXES, asked, raw.name, raw.units)
+        if "time" not in by_name and (clock := clock_by_values(raw)):
+            by_name["time"] = Found(clock, 1.0, False)
+        return by_name
     known = FIXES.quantities
     found = {
         quantity: Found(column, 1.0 if unit is None else known[quantity].units[unit], True)

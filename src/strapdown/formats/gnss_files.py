@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.formats import comma2k19, open_stream
-from strapdown.formats.arrays import numbers
+from strapdown.formats.arrays import epoch_of, numbers, open_dates
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock
 from strapdown.formats.coordinates import height_unit_open, with_degrees
 from strapdown.formats.find_columns import Found, fix_columns, names_of_quantities
@@ -32,8 +32,8 @@ from strapdown.formats.recording import RawLog
 from strapdown.formats.trajectory_readers import EARTH
 from strapdown.formats.vocabularies import FIXES
 from strapdown.frames import geodetic_from_ecef, geodetic_from_ned, geodetic_from_utm
-from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD
-from strapdown.units import OF_TABLES, SPEEDS, TIME_UNITS, unit_of
+from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD, height_words
+from strapdown.units import DATE_ORDERS, OF_TABLES, SPEEDS, TIME_UNITS, unit_of
 
 # GNSS fixes from tables with column names: text, Parquet.
 
@@ -67,7 +67,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         return np.column_stack([values(name) for name in names]) if there else None
 
     place, datum = _place(raw, found, values, options)
-    time, clock = _time(raw, found["time"])
+    time, clock = _time(raw, found["time"], options.units.get("time"))
     if "week" in found and clock.name == RELATIVE:
         clock = Clock(GPS)
     if "week" in found and clock.name == GPS:
@@ -93,7 +93,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         velocity_sd=velocity_sd,
         quality=_quality(raw, found, values),
         satellites=_satellites(raw),
-        heights_from=_LEVELS.get(datum, ""),
+        heights_from=_level(raw, found, datum, options),
         height_source=found[datum].source if datum in found else "",
         findings=raw.findings,
     )
@@ -107,6 +107,8 @@ def _in_units(raw: RawLog, found: dict[str, Found], units: Mapping[str, str]) ->
             raise ConfigError(
                 "io.unit-of-missing-column", file=raw.name, quantity="units", of_what=quantity
             )
+        if quantity == "time" and unit in DATE_ORDERS:
+            continue
         known = FIXES.quantities[quantity].units
         spelled = unit_of(unit, OF_TABLES) or unit
         check_choice("io.unknown-unit", known, quantity=f"units {quantity}", unit=spelled)
@@ -119,6 +121,25 @@ def _in_units(raw: RawLog, found: dict[str, Found], units: Mapping[str, str]) ->
 _GEODETIC, _ECEF, _LOCAL = ("lat", "lon"), ("ecef_x", "ecef_y", "ecef_z"), ("north", "east")
 _HEIGHTS = ("alt", "alt_msl", "alt_take_off", "alt_unstated")
 _LEVELS = {"alt_msl": "sea", "alt_take_off": "take-off", "alt_unstated": "unstated", "": NOWHERE}
+#: Names of heights that say that they count from the ellipsoid.
+_OVER_ELLIPSOID = re.compile(r"ell|wgs|hae", re.I)
+
+
+def _level(raw: RawLog, found: dict[str, Found], kind: str, options: GnssOptions) -> str:
+    """Return the level from which heights count, of `Fixes`; ``open`` for those of a bare name.
+
+    `kind`: quantity of the heights. Computed heights, those that the user names ``alt``, and those
+    of a Gnss table (`docs/case.md`), known by the names of its standard deviations, count from the
+    ellipsoid.
+    """
+    if kind != "alt":
+        return _LEVELS[kind]
+    if raw.heights is not None:
+        return "" if raw.heights == height_words(as_stated=False) else "as stated"
+    if raw.stated or "alt" in options.columns or "alt" not in found or "alt_msl" in found:
+        return ""
+    own = all(q in found and found[q].source in (q, f"{q}_m") for q in POSITION_SD)
+    return "" if own or _OVER_ELLIPSOID.search(found["alt"].source) else "open"
 
 
 def _refuse_missing(raw: RawLog, found: dict[str, Found], *, stated: bool) -> None:
@@ -390,10 +411,17 @@ _DATES = (9.467e8, 2.367e9)
 _SINCE_START = 1e8
 
 
-def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
-    time, name, dated = found.stamps(raw)
+def _time(raw: RawLog, found: Found, stated: str | None) -> tuple[Array, Clock]:
+    """Return stamps, s, and their clock. `stated`: their unit or the order of their dates."""
+    order = stated if stated in DATE_ORDERS else None
+    time, name, dated = found.stamps(raw, order)
+    values, source = raw.columns[found.source], found.source
+    if dated and (epoch := epoch_of(values, source)) is not None:
+        raw.note("io.stamps-of-epoch", "time", source=source, epoch=epoch)
+    if dated and order is None and (readings := open_dates(values)):
+        raw.warn("io.date-order-open", "time", source=source, date=values[0], **readings)
     first = float(time[np.isfinite(time)][0]) if np.isfinite(time).any() else 0.0
-    if name == UNIX and not (raw.clock or dated or found.stated) and first > 1e11:
+    if name != GPS and not (raw.clock or dated or found.stated) and first > 1e11:
         step = float(np.median(np.abs(np.diff(time)))) if time.size > 1 else np.nan
         # A receiver gives 100 fixes a second to one in two minutes: this, not the stamp, separates
         # a clock of 1970 in ms from one in ns that counts from the start of a phone.
@@ -414,7 +442,7 @@ def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
                 year=1970.0 + np.floor(first * TIME_UNITS[unit] / 31556952.0),
                 step=step * TIME_UNITS[unit],
             )
-            return time * TIME_UNITS[unit], Clock(name)
+            return time * TIME_UNITS[unit], Clock(UNIX)
         raise raw.fault(
             "io.stamp-no-date-clock-tells",
             "time",

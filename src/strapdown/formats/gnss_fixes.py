@@ -107,8 +107,9 @@ class Fixes:
     satellites: Array | None = None
     #: A standard deviation of zero means unknown.
     zero_is_unknown: bool = False
-    #: {'sea', 'take-off', 'unstated', 'nowhere', ''}: level from which heights are counted; empty:
-    #: from the ellipsoid; 'nowhere': the fixes have none.
+    #: {'sea', 'take-off', 'unstated', 'open', 'as stated', 'nowhere', ''}: level from which heights
+    #: are counted; empty: from the ellipsoid; 'open': the name of a column does not say it; 'as
+    #: stated': that of the fixes that were written to this file; 'nowhere': the fixes have none.
     heights_from: str = ""
     #: Column or field of the heights, for messages.
     height_source: str = ""
@@ -184,6 +185,16 @@ def _over_ellipsoid(fixes: Fixes, options: GnssOptions) -> Array:
         if options.datum_height is not None:
             raise ConfigError(
                 "io.heights-over-ellipsoid-already", file=fixes.name, quantity="datum_height_m"
+            )
+        return fixes.place
+    if options.datum_height is None and fixes.heights_from in ("open", "as stated"):
+        if fixes.heights_from == "open":
+            add_note(
+                fixes.findings,
+                "io.height-level-open",
+                file=fixes.name,
+                quantity="alt",
+                source=fixes.height_source,
             )
         return fixes.place
     if options.datum_height is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import re
 import shlex
 from collections.abc import Mapping, Sequence
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.columns import parse_axes
 from strapdown.tables import SAMPLINGS
+from strapdown.tables.checks import height_words
 
 Array = NDArray[np.float64]
 
@@ -195,6 +197,8 @@ class RawLog:
     clock: str | None = None
     #: Seconds on that clock at stamp zero.
     epoch: float = 0.0
+    #: Level of its heights in the words of `tables.checks.height_words`, if the file states it.
+    heights: str | None = None
     #: Whether `strapdown doctor` wrote it: its statements were checked against the numbers, or were
     #: decided by a person.
     checked: bool = False
@@ -235,6 +239,19 @@ class RawLog:
     def warn(self, code: str, quantity: str | None = None, **data: Any) -> None:
         """Add a warning about the file."""
         add_warning(self.findings, code, file=self.name, quantity=quantity, **data)
+
+    def backward(self) -> RawLog:
+        """Return the log with its rows in the opposite order, and a note that they were so."""
+        count = len(next(iter(self.columns.values())))
+        rows = np.arange(1, count + 1) if self.rows is None else self.rows
+        out = dataclasses.replace(
+            self,
+            columns={name: values[::-1].copy() for name, values in self.columns.items()},
+            rows=rows[::-1],
+            findings=list(self.findings),
+        )
+        out.note("io.rows-in-descending-order", "time", count=count)
+        return out
 
     def row(self, sample: int) -> int:
         """Row of a sample in the file, counted from 1."""
@@ -362,7 +379,7 @@ def stated_by(meta: Mapping[str, Any]) -> dict[str, Any]:
     """Return attributes of a `RawLog` from the metadata or comments of a file.
 
     `meta`: text by key: ``sampling``, ``axes``, ``clock``, ``clock_origin_s``, ``checked``,
-    ``calibration``.
+    ``calibration``, ``heights``.
     """
     sampling, checked = meta.get("sampling"), meta.get("checked") == CHECKED
     stated: dict[str, Any] = {"sampling": sampling if sampling in SAMPLINGS else None, "axes": None}
@@ -373,4 +390,6 @@ def stated_by(meta: Mapping[str, Any]) -> dict[str, Any]:
     if checked:
         stated |= {"clock": meta.get("clock"), "epoch": float(meta.get("clock_origin_s", 0.0))}
     by = calibrated_in(meta["calibration"]) if "calibration" in meta else None
+    levels = (height_words(as_stated=False), height_words(as_stated=True))
+    stated["heights"] = meta.get("heights") if meta.get("heights") in levels else None
     return {**stated, "checked": checked, "calibrated": by}

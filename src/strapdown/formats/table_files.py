@@ -7,8 +7,9 @@ import dataclasses
 import io
 import json
 import re
+import tempfile
 from datetime import datetime, time
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -16,16 +17,19 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding, add_note
-from strapdown.formats import csv
+from strapdown.formats import csv, join
 from strapdown.formats.android_events import joined, kind_of
 from strapdown.formats.arrays import raw_log
 from strapdown.formats.columns import read_name
+from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.known_formats import from_json, under
 from strapdown.formats.phone_apps import with_force_summed
 from strapdown.formats.recording import RawLog
-from strapdown.formats.signs import Signs, head
+from strapdown.formats.sensor_folder import peek
+from strapdown.formats.signs import Signs, first_bytes, head
+from strapdown.formats.vocabularies import FIXES
 from strapdown.parsers import parse
-from strapdown.parsers.archives import numpy_array
+from strapdown.parsers.archives import PACKED, numpy_array
 from strapdown.tables.on_disk import room
 
 # Excel workbooks (``.xlsx``) by openpyxl: the sheet with the most numbers, as a table.
@@ -69,6 +73,55 @@ def _text_of_excel(cell: Any) -> str:
     return repr(cell) if isinstance(cell, float) else str(cell)
 
 
+# Files that are compressed by themselves (``.gz``, ``.bz2``, ``.xz``, ``.zst``), and archives of
+# one file: read as the file in them, whatever its format.
+
+
+PACKED_TITLE = "one file in .gz, .bz2, .xz, .zst or .zip"
+
+
+def _holds_one(path: Path) -> bool:
+    if path.suffix.lower() != ".zip":
+        return first_bytes(path, 6).startswith(tuple(PACKED))
+    return len(peek(path)) == 1
+
+
+detect_packed = Signs(also=_holds_one)
+
+
+def read_packed(path: Path) -> RawLog:
+    """Read the samples of the file in it."""
+    return _read_inside(path, "imu")
+
+
+def read_packed_fixes(path: Path) -> RawLog | Fixes:
+    """Read the fixes of the file in it."""
+    return _read_inside(path, "gnss")
+
+
+def _read_inside(path: Path, stream: str) -> Any:
+    """Read a stream of the file in a compressed file, which is unpacked into a temporary folder."""
+    from strapdown.formats import open_stream
+
+    members = peek(path) if path.suffix.lower() == ".zip" else []
+    if members:
+        name, data = PurePosixPath(members[0].name).name, members[0].read()
+    else:
+        name, data = path.stem, parse("archives.unpacked", path)
+    if data[:4] == b"PK\x03\x04" or data.startswith(tuple(PACKED)) or name.endswith(".tar"):
+        raise DataError("io.packed-twice", file=path.name, name=name)
+    with tempfile.TemporaryDirectory(prefix="strapdown-") as folder:
+        file = Path(folder) / (name or "log.csv")
+        file.write_bytes(data)
+        try:
+            raw = open_stream(file, stream)
+        except DataError as error:
+            raise DataError(error.finding, file=f"{path.name}/{name}") from None
+    return (
+        dataclasses.replace(raw, name=path.name, files=(path,)) if isinstance(raw, RawLog) else raw
+    )
+
+
 # JSON of samples: lines of one object each, or one list of objects, alone or as the member of an
 # object.
 #
@@ -98,6 +151,14 @@ _BY_COLUMNS = re.compile(
 )
 
 
+#: An object in an object whose members are columns, or rows under a list of names; rows alone.
+_NESTED = re.compile(
+    r'\{\s*(?:"[^"]*"\s*:\s*(?:"[^"]*"|[-\w.+]+)\s*,\s*)*"[^"]*"\s*:\s*\{\s*'
+    r'(?:"[^"]*"\s*:\s*(?:"[^"]*"|[-\w.+]+|\{)\s*,?\s*)*"[^"]*"\s*:\s*\[\s*["\d\[{-]'
+)
+_ROWS = re.compile(r'\[\s*\[\s*["\d-]')
+
+
 def _is_object(line: str) -> bool:
     try:
         return isinstance(json.loads(line), dict)
@@ -109,7 +170,9 @@ def _begins(path: Path) -> bool:
     """Whether an object is at the beginning."""
     text = head(path).lstrip()
     if path.suffix.lower() in JSON_SUFFIXES[:1] and text.startswith("["):
-        return text[1:].lstrip().startswith("{")
+        return text[1:].lstrip().startswith("{") or _ROWS.match(text) is not None
+    if path.suffix.lower() in JSON_SUFFIXES[:1] and _NESTED.match(text):
+        return True
     if _APART.search(text) or _MEMBER.match(text) or _is_by_columns(text):
         return True
     return _is_object(text.partition("\n")[0])
@@ -122,8 +185,17 @@ def read_json_table(path: Path) -> RawLog:
     """Read the members of the objects as columns, missing ones as NaN."""
     if _APART.search(head(path)):
         return _names_apart(path)
-    if _is_by_columns(head(path).lstrip()):
+    top = head(path).lstrip()
+    if _is_by_columns(top) or _ROWS.match(top):
         return _by_columns(path)
+    if (_NESTED.match(top) or _MEMBER.match(top)) and "}\n{" not in top:
+        content = _unwrapped(from_json(path))
+        if parts := _sensors_apart(content):
+            return _joined(path, parts)
+        if isinstance(content, dict) and any(isinstance(v, list) for v in content.values()):
+            lists = [v for v in content.values() if isinstance(v, list)]
+            if not all(v and isinstance(v[0], dict) for v in lists):
+                return _of_columns(path, content)
     objects, rows, findings = _objects(path)
     kind = next(
         (k for k in KINDS if len({kind_of(str(o.get(k))) for o in objects} - {None}) > 1), None
@@ -145,6 +217,17 @@ def read_json_table(path: Path) -> RawLog:
             )
     raw = RawLog(path.name, (path,), columns, rows=np.array(rows), findings=findings)
     return with_force_summed(raw)
+
+
+def read_json_fixes(path: Path) -> RawLog:
+    """Read the object of fixes of an object of sensors; the whole table of any other file."""
+    top = head(path).lstrip()
+    if (_NESTED.match(top) or _MEMBER.match(top)) and "}\n{" not in top:
+        for name, columns in _sensors_apart(_unwrapped(from_json(path))).items():
+            if {"lat", "lon"} <= {read_name(n, FIXES).quantity for n in columns}:
+                arrays = {n: _array_of(values) for n, values in columns.items()}
+                return RawLog(f"{path.name}/{name}", (path,), arrays)
+    return read_json_table(path)
 
 
 def _is_by_columns(text: str) -> bool:
@@ -171,11 +254,22 @@ def _by_columns(path: Path) -> RawLog:
 
     DataError: it is no object, or has no numbers.
     """
-    content = from_json(path)
-    held = content if isinstance(content, dict) else {}
-    if isinstance(held.get("columns"), list) and isinstance(held.get("data"), list):
-        rows = [row for row in held["data"] if isinstance(row, list)]
-        held = {str(n): [row[k] for row in rows] for k, n in enumerate(held["columns"])}
+    content = _unwrapped(from_json(path))
+    if parts := _sensors_apart(content):
+        return _joined(path, parts)
+    return _of_columns(path, content)
+
+
+def _of_columns(path: Path, content: Any) -> RawLog:
+    held = content if isinstance(content, dict) else {"rows": content}
+    tables = [v for v in held.values() if isinstance(v, list) and v and isinstance(v[0], list)]
+    if len(tables) == 1 and len(tables[0][0]) > 3:
+        rows, width = [row for row in tables[0] if isinstance(row, list)], len(tables[0][0])
+        heads = [v for v in held.values() if _are_names(v, width)]
+        if not heads and _are_names(rows[0], width):
+            heads, rows = [rows[0]], rows[1:]
+        if len(heads) == 1 and all(len(row) == width for row in rows):
+            held = {str(n): [row[k] for row in rows] for k, n in enumerate(heads[0])}
     arrays: dict[str, NDArray[Any]] = {}
     meta: dict[str, Any] = {}
     for name, values in held.items():
@@ -183,12 +277,65 @@ def _by_columns(path: Path) -> RawLog:
         if not isinstance(given, list):
             meta[str(name)] = given
             continue
-        try:
-            array = np.array(given, dtype=None if all(type(v) is int for v in given) else float)
-        except (TypeError, ValueError):
-            array = _dates_of(given)
-        arrays[str(name)] = array
+        arrays[str(name)] = _array_of(given)
     return with_force_summed(raw_log(path, arrays, {}, meta))
+
+
+def _are_names(value: Any, width: int) -> bool:
+    """Whether a value is a list of names, as many as a row has columns."""
+    return (
+        isinstance(value, list) and len(value) == width and all(isinstance(n, str) for n in value)
+    )
+
+
+def _unwrapped(content: Any) -> Any:
+    """Return the one object in an object that has nothing else but words and numbers."""
+    while isinstance(content, dict):
+        inside = [v for v in content.values() if isinstance(v, dict | list)]
+        if len(inside) != 1 or not isinstance(inside[0], dict):
+            break
+        content = inside[0]
+    return content
+
+
+def _sensors_apart(content: Any) -> dict[str, dict[str, list[Any]]]:
+    """Return the columns of each sensor in an object of sensors, each with its own clock.
+
+    A sensor is an object of columns or a list of objects; empty if there are none of them.
+    """
+    out: dict[str, dict[str, list[Any]]] = {}
+    for name, held in content.items() if isinstance(content, dict) else ():
+        if isinstance(held, list) and held and all(isinstance(one, dict) for one in held):
+            flat = [_unfolded(one) for one in held]
+            columns = {n: [one.get(n) for one in flat] for n in flat[0]}
+        elif isinstance(held, dict) and held and all(isinstance(v, list) for v in held.values()):
+            columns = held
+        else:
+            continue
+        if any(read_name(n).quantity == "time" for n in columns):
+            # x, y and z of the sensor.
+            out[str(name)] = {
+                f"{name} {n}" if n.lower() in tuple("xyz") else n: values
+                for n, values in columns.items()
+            }
+    return out if len(out) > 1 else {}
+
+
+def _joined(path: Path, parts: dict[str, dict[str, list[Any]]]) -> RawLog:
+    """Join the sensors of an object on the stamps of the gyro."""
+    logs = []
+    for name, columns in parts.items():
+        arrays = {n: _array_of(values) for n, values in columns.items()}
+        if len({a.size for a in arrays.values()}) == 1:
+            logs.append(RawLog(f"{path.name}/{name}", (path,), arrays))
+    return join.join(logs, path.name, (path,))
+
+
+def _array_of(values: list[Any]) -> NDArray[Any]:
+    try:
+        return np.array(values, dtype=None if all(type(v) is int for v in values) else float)
+    except (TypeError, ValueError):
+        return _dates_of(values)
 
 
 def _dates_of(values: list[Any]) -> NDArray[Any]:

@@ -21,7 +21,10 @@ from strapdown.tables import on_disk
 
 Columns = list[NDArray[Any]]
 #: Texts of missing values.
-NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
+NULLS = (
+    *("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "n/a", "NULL", "null", "None", "NaT"),
+    *("#N/A", "#NV", "#NUM!", "#VALUE!", "#DIV/0!", "#REF!"),
+)
 #: Bytes of a block; the first decides which columns are numeric.
 BLOCK = 1 << 20
 #: Threads that parse blocks where all columns are numbers.

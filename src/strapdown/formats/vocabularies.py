@@ -118,7 +118,9 @@ TIMES = _words(
     "gpstow gpstime unixtime epoch epoc stamp elapsedtime timeelapsed timesincestart sampletime "
     "sensortime systemtime unixtimestamp datetime localtime utc utctime timeutc "
     "gpssecondsofweek secondsofweek gpst timeintervalsince1970 zeit zeitstempel temps tiempo tempo "
-    "rtctime chiptime utime offsettime"
+    "rtctime chiptime utime offsettime heure hora ora tijd czas tid saat čas время 时间 時刻 "
+    "datenum juliandate modifiedjuliandate jd mjd filetime gpsseconds ntptime ntptimestamp "
+    "cfabsolutetime labviewtime secondsofday sod"
 )
 # Names of clocks that state their unit.
 CLOCKS = {
@@ -335,7 +337,8 @@ _GEODETIC: dict[str, Quantity] = {
         _words(
             "alt altitude h hgt height hell altell heightell ellipsoidalheight heightellipsoid "
             "altitudeellipsoid ellipsoidheight ellheight heightwgs84 altitudewgs84 "
-            "höhe hohe hoehe altitud altura altitudine quota hoogte высота 高度 고도"
+            "altellipsoid hae höhe hohe hoehe altitud altura altitudine quota hoogte высота "
+            "高度 고도"
         ),
         LENGTHS,
     ),
@@ -375,7 +378,9 @@ FIXES = Vocabulary(
         **_GEODETIC,
         "alt_msl": Quantity(
             _words(
-                "hmsl altmsl altitudemsl heightmsl mslaltitude mslheight orthometricheight 海拔"
+                "hmsl altmsl altitudemsl heightmsl mslaltitude mslheight orthometricheight 海拔 "
+                "msl amsl altamsl altitudeamsl altitudeabovesealevel heightabovesealevel "
+                "altitudeabovemeansealevel"
             ),
             LENGTHS,
         ),

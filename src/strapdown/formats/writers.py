@@ -71,6 +71,7 @@ from strapdown.tables.checks import (
     POSITION_SD,
     VELOCITY,
     VELOCITY_SD,
+    height_words,
 )
 
 Array = NDArray[Any]
@@ -250,6 +251,13 @@ def table_columns(table: pd.DataFrame) -> dict[str, Array]:
     return columns
 
 
+def table_comments(table: pd.DataFrame) -> dict[str, str]:
+    """Return what a file states of a table by time beside its columns: the level of heights."""
+    if "alt" not in table.columns:
+        return {}
+    return {"heights": height_words(as_stated=bool(table.attrs.get(HEIGHTS_AS_STATED)))}
+
+
 def _columns(tables: Tables) -> tuple[dict[str, Array], dict[str, str]]:
     """Return the columns of the one table of a file on its clock, and what the file states."""
     if "imu" in tables:
@@ -257,7 +265,8 @@ def _columns(tables: Tables) -> tuple[dict[str, Array], dict[str, str]]:
     else:
         table = next(iter(tables.values()))
         unknown = [c for c in VELOCITY_SD if c in table.columns and (table[c] == 0.0).any()]
-        columns, said = table_columns(table.drop(columns=unknown and VELOCITY_SD)), {}
+        columns = table_columns(table.drop(columns=unknown and VELOCITY_SD))
+        said = table_comments(table)
     first = next(iter(columns))
     timed = time_column(next(iter(tables.values())))
     return timed | {name: values for name, values in columns.items() if name != first}, said

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 import zipfile
 from collections.abc import Sequence
@@ -11,7 +12,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from strapdown.errors import DataError
-from strapdown.parsers.limits import damage, refuse_lie, refuse_total
+from strapdown.parsers.limits import damage, declared_most, refuse_lie, refuse_total, size_of
 
 #: Most members of an archive. Recordings have some ten tables, and perhaps their pictures.
 MOST_MEMBERS = 100_000
@@ -67,6 +68,37 @@ def member(path: Path, name: str, count: int = -1) -> bytes:
         refuse_lie(info.file_size, info.compress_size, name, path.name)
         with archive.open(info) as stream:
             return stream.read(count)
+
+
+#: First bytes of files that are compressed by gzip, bzip2, xz and Zstandard.
+PACKED = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\xfd7zXZ": "lzma", b"\x28\xb5\x2f\xfd": "zstd"}
+#: Bytes that are unpacked at a time.
+_PART = 1 << 20
+
+
+def unpacked(path: Path) -> bytes:
+    """Return the content of a compressed file, if it is not too large."""
+    with damage("io.packed-unreadable", path):
+        with path.open("rb") as file:
+            begin = file.read(6)
+        kind = next(k for magic, k in PACKED.items() if begin.startswith(magic))
+        parts: list[bytes] = []
+        size, most = 0, declared_most(size_of(path))
+        with _unpacking(path, kind) as stream:
+            while part := stream.read(_PART):
+                size += len(part)
+                if size > most:
+                    refuse_total(size, path)
+                parts.append(bytes(part))
+        return b"".join(parts)
+
+
+def _unpacking(path: Path, kind: str) -> Any:
+    if kind == "zstd":
+        import pyarrow as pa
+
+        return pa.CompressedInputStream(pa.OSFile(str(path)), "zstd")
+    return importlib.import_module(kind).open(path, "rb")
 
 
 def array_names(path: Path) -> list[str]:

@@ -205,7 +205,7 @@ class Memory:
             yield NOWHERE
             return
         from strapdown.formats import csv
-        from strapdown.formats.writers import WRITERS, table_columns
+        from strapdown.formats.writers import WRITERS, table_columns, table_comments
 
         with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
             folder = Path(name).resolve()
@@ -213,7 +213,7 @@ class Memory:
                 if file.endswith(".npz"):
                     WRITERS["npz"].write(folder / file, {"imu": table})
                 else:
-                    csv.write(folder / file, table_columns(table), {})
+                    csv.write(folder / file, table_columns(table), table_comments(table))
                 let_go(table)
             yield folder
 

@@ -16,6 +16,7 @@ import strapdown as sd
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.frames import ecef_from_geodetic, geodetic_from_ned
+from strapdown.tables.checks import HEIGHTS_AS_STATED
 
 PLACE = np.array([47.0, 8.5, 450.0])
 SD = 2.0
@@ -91,11 +92,47 @@ def test_heights_over_the_sea(tmp_path):
 
 
 def test_a_height_over_the_ellipsoid_takes_no_datum(tmp_path):
-    path = written(tmp_path / "a.csv", geodetic())
+    table = geodetic()
+    table["alt_ellipsoid"] = table.pop("alt")
+    path = written(tmp_path / "a.csv", table)
     with pytest.raises(ConfigError, check=coded("io.heights-over-ellipsoid-already")):
         sd.read_gnss(path, position_sd_m=SD, datum_height_m=48.5)
     with pytest.raises(ConfigError, check=coded("io.origin-beside-positions")):
         sd.read_gnss(path, position_sd_m=SD, origin=tuple(PLACE))
+
+
+@pytest.mark.parametrize("name", ["alt", "altitude", "Height (m)"])
+def test_a_bare_name_leaves_the_level_of_heights_open(tmp_path, name):
+    table = geodetic()
+    heights = table[name] = table.pop("alt")
+    path = written(tmp_path / "a.csv", table)
+    fixes = sd.read_gnss(path, position_sd_m=SD)
+    assert "io.height-level-open" in [f.code for f in fixes.findings]
+    assert fixes.attrs[HEIGHTS_AS_STATED]  # the result says so
+    raised = sd.read_gnss(path, position_sd_m=SD, datum_height_m=48.5)
+    np.testing.assert_array_equal(raised["alt"], heights + 48.5)
+    named = sd.read_gnss(path, position_sd_m=SD, columns={"alt": name})
+    assert HEIGHTS_AS_STATED not in named.attrs
+    for each, as_stated in ((fixes, True), (raised, False)):  # what is written says it
+        sd.write({"gnss": each}, tmp_path / "b.csv", force=True)
+        again = sd.read_gnss(tmp_path / "b.csv", position_sd_m=SD)
+        assert bool(again.attrs.get(HEIGHTS_AS_STATED)) == as_stated
+        assert "io.height-level-open" not in [f.code for f in again.findings]
+
+
+def test_heights_of_a_drone_over_sea_and_take_off(tmp_path):
+    """Columns of DJI flight logs as Airdata exports them; heights over the sea come first."""
+    table = geodetic()
+    table["altitude_above_seaLevel(feet)"] = table.pop("alt")
+    table["height_above_takeoff(feet)"] = np.arange(4.0)
+    for left_out, code in (
+        ("", "io.height-over-sea-column"),
+        ("altitude_above_seaLevel(feet)", "io.heights-over-take-off"),
+    ):
+        held = {name: values for name, values in table.items() if name != left_out}
+        path = written(tmp_path / "a.csv", held)
+        with pytest.raises(DataError, check=coded(code)):
+            sd.read_gnss(path, position_sd_m=SD)
 
 
 def test_local_positions_need_an_origin(tmp_path):

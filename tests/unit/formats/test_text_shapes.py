@@ -8,7 +8,7 @@ from tests.coded import coded
 
 from strapdown.errors import DataError
 from strapdown.formats import csv, read_log, read_raw, text_columns
-from strapdown.formats.arrays import excel_nanoseconds, nanoseconds_of
+from strapdown.formats.arrays import epoch_of, nanoseconds_of, nanoseconds_of_epoch
 from strapdown.formats.clocks import counted
 from strapdown.formats.csv import stated_rate, stated_units
 from strapdown.formats.recording import ReadOptions
@@ -186,11 +186,11 @@ def test_a_time_of_day_is_no_clock_of_1970(tmp_path):
 
 def test_days_of_a_spreadsheet():
     days = 45000.25 + np.arange(5) * 0.01 / 86400
-    ns = excel_nanoseconds(days)
+    ns = nanoseconds_of_epoch(days, epoch_of(days))
     assert ns[0] == np.datetime64("2023-03-15T06:00:00", "ns").astype(np.int64)
     assert np.allclose(np.diff(ns), 1e7, atol=2e3)
-    assert excel_nanoseconds(45000.25 + np.arange(5) * 0.01) is None  # seconds since a start
-    assert excel_nanoseconds(np.arange(45000, 45005)) is None
+    assert epoch_of(45000.25 + np.arange(5) * 0.01) is None  # seconds since a start
+    assert epoch_of(np.arange(45000, 45005)) is None
 
 
 def test_seconds_and_nanoseconds_in_two_columns(tmp_path):

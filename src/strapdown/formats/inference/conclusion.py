@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
 from strapdown.errors import Finding
 from strapdown.tables.on_disk import filled, let_go, stored
-from strapdown.units import TIME_UNITS
+from strapdown.units import TIME_UNITS, factor_of
 
 K = TypeVar("K", bound=Hashable)
 
@@ -238,7 +238,7 @@ def infer_time_unit(stamps: NDArray[Any]) -> Inference:
 
 def time_evidence(steps: Steps, unit: str) -> tuple[Finding, ...]:
     """List the evidence of the stamps for a unit."""
-    factor, first = TIME_UNITS[unit], float(steps.stamps[0])
+    factor, first = factor_of(unit, TIME_UNITS), float(steps.stamps[0])
     told = [evidence("io.evidence-mean-step", step=steps.mean, rate_hz=1.0 / (steps.mean * factor))]
     if EPOCH[0] <= first * factor <= EPOCH[1]:
         year = 1970 + first * factor / 31_556_952.0
@@ -261,7 +261,7 @@ def infer_rate(steps: Steps, unit: str) -> Inference:
         within = float(np.mean(np.abs(forward - median) <= 0.1 * median))
     if largest >= 1.5 * mean:
         missing = float(np.maximum(np.round(forward / mean) - 1.0, 0.0).sum())
-    factor = TIME_UNITS[unit]
+    factor = factor_of(unit, TIME_UNITS)
     told = (
         evidence("io.evidence-steps", mean_ms=1e3 * mean * factor, median_ms=1e3 * median * factor),
         evidence("io.evidence-regular-steps", percent=100 * within),

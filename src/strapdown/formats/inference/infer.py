@@ -30,7 +30,7 @@ from strapdown.formats.inference.rotation_rate import infer_gyro
 from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.tables.checks import all_finite
 from strapdown.tables.on_disk import let_go
-from strapdown.units import MAG_UNITS, TIME_UNITS, parse_unit
+from strapdown.units import MAG_UNITS, TIME_UNITS, factor_of, parse_unit
 
 Array = NDArray[np.float64]
 # Of a longer log the signals are judged in contiguous parts, spread evenly over it so that rests
@@ -74,7 +74,7 @@ def infer(raw: RawLog, options: ReadOptions | None = None) -> tuple[Inference, .
     if "time" in found:
         stamps, dated = ticks_of(raw, found["time"].source, found["time"].unit)
         unit = "ns" if dated else found["time"].unit
-        if options.time_unit:
+        if options.time_unit and not dated:
             unit = parse_unit(options.time_unit, "time")
     triads = {t: _triad(raw, found, t) for t in ("gyro", "accel", "mag")}
     return infer_signals(Signals(stamps, **triads, time_unit=unit, rate=options.rate or raw.rate))
@@ -109,7 +109,7 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
     step = 1.0 / signals.rate if signals.rate else None
     if steps is not None and times:
         best = next(iter(times))
-        known = steps.mean * TIME_UNITS[best]
+        known = steps.mean * factor_of(best, TIME_UNITS)
         step = known if known > 0 and times[best] > 0.9 else None
     # All stamps tell of the clock; of the rest a part is enough.
     signals, starts = _part(signals, step)

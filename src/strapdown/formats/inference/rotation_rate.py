@@ -21,7 +21,7 @@ from strapdown.formats.inference.conclusion import (
     marginal,
     posterior,
 )
-from strapdown.units import GYRO_UNITS, TIME_UNITS
+from strapdown.units import GYRO_UNITS, TIME_UNITS, factor_of
 
 Array = NDArray[np.float64]
 
@@ -120,7 +120,7 @@ def infer_gyro(
     by_scale: dict[float, dict[Hypothesis, float]] = {}
     stood: list[Finding] = []
     for tau, share in likely.items():
-        factor = TIME_UNITS[tau]
+        factor = factor_of(tau, TIME_UNITS)
         step = Steps.of(ticks).mean * factor
         candidates: dict[tuple[str | None, str], tuple[float, float]] = {}
         for k, count in enumerate(_COUNTS):
