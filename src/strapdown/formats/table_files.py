@@ -135,6 +135,8 @@ JSON_SUFFIXES = (".json", ".jsonl", ".ndjson", ".jsonlines", ".ldjson")
 KINDS = ("sensor", "type", "name", "kind", "sensorType", "sensor_type")
 #: Deepest nesting that is unfolded, and most parts of a list.
 DEEP, PARTS = 6, 16
+#: A stamp after the next block by so many of its samples is behind a gap.
+LONG_BLOCK = 1.5
 
 
 #: A list of sensors before the list of their values, as Edge Impulse has them (data acquisition
@@ -197,6 +199,8 @@ def read_json_table(path: Path) -> RawLog:
             if not all(v and isinstance(v[0], dict) for v in lists):
                 return _of_columns(path, content)
     objects, rows, findings = _objects(path)
+    if blocks := _of_blocks(objects):
+        return _joined_blocks(path, blocks, findings)
     kind = next(
         (k for k in KINDS if len({kind_of(str(o.get(k))) for o in objects} - {None}) > 1), None
     )
@@ -329,6 +333,82 @@ def _joined(path: Path, parts: dict[str, dict[str, list[Any]]]) -> RawLog:
         if len({a.size for a in arrays.values()}) == 1:
             logs.append(RawLog(f"{path.name}/{name}", (path,), arrays))
     return join.join(logs, path.name, (path,))
+
+
+#: By sensor: the name of its clock, the stamps of its blocks, their samples, and names of these.
+Blocks = dict[str, tuple[str, list[float], list[list[list[Any]]], list[str]]]
+
+
+def _of_blocks(objects: list[dict[str, Any]]) -> Blocks:
+    """Return the blocks of samples that objects hold under one stamp each; empty if they do not.
+
+    ``{"acc": {"Timestamp": 20, "ArrayAcc": [{"x": 0.1, …}, …]}}`` as Movesense writes them, and
+    ``{"timestamp": 20, "gyroscope": {"x": [0.1, …], "y": […], "z": […]}}`` as watches of Garmin.
+    """
+    out: Blocks = {}
+    for one in objects:
+        held = one
+        while len(held) == 1 and isinstance(inside := next(iter(held.values())), dict):
+            held = inside
+        stamps = [n for n, v in held.items() if isinstance(v, int | float) and _is_time(n)]
+        sensors: dict[str, list[list[Any]]] = {}
+        for name, value in held.items():
+            axes = value[0] if isinstance(value, list) and value else value
+            if not isinstance(axes, dict) or not {*"xyz"} <= axes.keys():
+                continue
+            if value is axes:
+                columns = [value[a] if isinstance(value[a], list) else [] for a in "xyz"]
+            else:
+                columns = [[v.get(a) for v in value if isinstance(v, dict)] for a in "xyz"]
+            sensors[name.removeprefix("Array")] = [list(row) for row in zip(*columns, strict=False)]
+        sizes = {len(rows) for rows in sensors.values()}
+        if len(stamps) != 1 or len(sizes) != 1 or sizes == {0}:
+            return {}
+        names = [f"{name} {a}" for name in sensors for a in "xyz"]
+        _, times, blocks, _ = out.setdefault(" ".join(sensors), (stamps[0], [], [], names))
+        times.append(held[stamps[0]])
+        samples = zip(*sensors.values(), strict=True)
+        blocks.append([[v for row in rows for v in row] for rows in samples])
+    return out
+
+
+def _is_time(name: str) -> bool:
+    return read_name(name).quantity == "time"
+
+
+def _joined_blocks(path: Path, blocks: Blocks, findings: list[Finding]) -> RawLog:
+    """Spread the samples of blocks evenly between their stamps, and join the sensors."""
+    parts: dict[str, dict[str, list[Any]]] = {}
+    for sensor, (clock, times, rows, names) in blocks.items():
+        sizes = np.array([len(one) for one in rows])
+        stamps = np.array(times, dtype=np.float64)
+        steps = np.diff(stamps) / sizes[:-1]
+        usual = float(np.median(steps)) if steps.size else 0.0
+        # The block before a gap ends as others do.
+        steps = np.where(np.abs(steps) < LONG_BLOCK * abs(usual), steps, usual)
+        steps = np.append(steps, usual)
+        at = [
+            t + k * dt
+            for t, dt, n in zip(times, steps.tolist(), sizes, strict=True)
+            for k in range(n)
+        ]
+        values = [row for block in rows for row in block]
+        parts[sensor] = {clock: at, **{n: [v[k] for v in values] for k, n in enumerate(names)}}
+        if sizes.max() > 1:
+            add_note(
+                findings,
+                "io.stamps-of-blocks",
+                file=path.name,
+                quantity=sensor,
+                count=int(np.median(sizes)),
+            )
+    if len(parts) > 1:
+        raw = _joined(path, parts)
+    else:
+        (only,) = parts.values()
+        raw = RawLog(path.name, (path,), {n: _array_of(v) for n, v in only.items()})
+    raw.findings[:0] = findings
+    return raw
 
 
 def _array_of(values: list[Any]) -> NDArray[Any]:

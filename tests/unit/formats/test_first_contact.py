@@ -271,6 +271,40 @@ def test_printed_lines_that_may_be_read_in_two_ways_are_not(form):
     assert csv._unlabelled(lines) is lines
 
 
+def by_axis(rows, digits=7):
+    return [dict(zip("xyz", (round(float(v), digits) for v in row), strict=True)) for row in rows]
+
+
+@pytest.mark.parametrize("kind", ["apart", "together", "columns"])
+def test_blocks_of_samples_under_one_stamp(tmp_path, kind):
+    """A sensor on a belt (Movesense), and a watch (Garmin): a list of samples a stamp."""
+    many_at, records, rate = 5, [], RATE * DEG
+    for k in range(0, N, many_at):
+        stamp, part = round(1e3 * T[k]), slice(k, k + many_at)
+        acc, gyro = by_axis(FORCE[part]), by_axis(rate[part])
+        if kind == "apart":
+            records.append({"acc": {"Timestamp": stamp, "ArrayAcc": acc}})
+            records.append({"gyro": {"Timestamp": stamp, "ArrayGyro": gyro}})
+        elif kind == "together":
+            both = {"Timestamp": stamp, "ArrayAcc": acc, "ArrayGyro": gyro}
+            records.append({"imu6": both})
+        else:
+            columns = {a: [one[a] for one in acc] for a in "xyz"}
+            turns = {a: [one[a] for one in gyro] for a in "xyz"}
+            records.append({"timestamp": stamp, "accelerometer": columns, "gyroscope": turns})
+    if kind == "apart":
+        del records[2 * 100 : 2 * 110]  # a gap does not stretch the block before it
+    path = written(tmp_path, "blocks.json", [json.dumps({"data": records})])
+    imu = sd.read_imu(path)
+    assert "io.stamps-of-blocks" in {f.code for f in imu.findings}
+    if kind == "apart":
+        kept = np.r_[0:500, 550:N]
+        np.testing.assert_allclose(imu.index, T[kept], atol=1e-9)
+        np.testing.assert_allclose(imu[GYRO], RATE[kept], atol=1e-6)
+    else:
+        check(imu)
+
+
 def test_sentences_whose_fields_are_known(tmp_path):
     rows = []
     for k in range(N):
