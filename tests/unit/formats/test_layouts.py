@@ -242,7 +242,7 @@ def test_vectors_in_cells(tmp_path, form):
 @pytest.mark.parametrize("apart", [False, True])
 @pytest.mark.parametrize("texts", [False, True])
 def test_one_value_a_row(tmp_path, apart, texts):
-    """Names as ``gyro_x``, or sensor and axis in two columns; clocks of texts are in their order."""
+    """Names as ``gyro_x``, or sensor and axis in two columns; 9:59 is before 10:00."""
     rows = []
     for k, row in enumerate(ROWS):
         stamp = (
