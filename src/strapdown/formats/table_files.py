@@ -91,12 +91,16 @@ detect_packed = Signs(also=_holds_one)
 
 def read_packed(path: Path) -> RawLog:
     """Read the samples of the file in it."""
-    return _read_inside(path, "imu")
+    raw = _read_inside(path, "imu")
+    assert isinstance(raw, RawLog)
+    return raw
 
 
 def read_packed_fixes(path: Path) -> RawLog | Fixes:
     """Read the fixes of the file in it."""
-    return _read_inside(path, "gnss")
+    raw = _read_inside(path, "gnss")
+    assert isinstance(raw, RawLog | Fixes)
+    return raw
 
 
 def _read_inside(path: Path, stream: str) -> Any:
