@@ -675,7 +675,7 @@ def _three_of(raw: RawLog, quantity: str, source: str) -> list[str]:
             source=source,
             width=width,
             of_what=quantity,
-            width_2=width - 3,
+            first=f"{source}[{width - 3}]",
         )
     if width >= 3 and (not index or index.rstrip("]").isdecimal()):
         first = int(index.rstrip("]")) if index else 0
