@@ -1,4 +1,4 @@
-"""What a remedy says to type can be typed: in Python it parses, on the command line it is an option.
+"""What a remedy says to type can be typed: arguments of Python parse, options exist.
 
 Names of columns and files are from strangers: they are filled in with blanks, quotes and signs.
 """

@@ -57,8 +57,9 @@ _EPOCHS: dict[str, tuple[float, float]] = {
     "100 ns since 1601, as Windows": (116_444_736_000_000_000, 1e7),
     "2^-32 s since 1900, as NTP": (2_208_988_800 * 2**32, 2.0**32),
 }
-#: 2000 to 2045, s since 1970; the most days that a step of a log has, 0.26 s.
-_YEARS, _MOST_STEP = (946_684_800, 2_366_841_600), 3e-6
+#: 2000 to 2045, s since 1970; the most days that a step of a log has, 0.26 s, and one of fixes,
+#: 43 s.
+_YEARS, _MOST_STEP, STEP_OF_FIXES = (946_684_800, 2_366_841_600), 3e-6, 5e-4
 
 
 def is_day_time(field: object) -> bool:
@@ -248,11 +249,11 @@ def _zone(text: str | None) -> int:
     return (-1 if text[0] == "-" else 1) * minutes * 60 * 10**9
 
 
-def epoch_of(values: NDArray[Any], column: str = "") -> str | None:
+def epoch_of(values: NDArray[Any], column: str = "", most_step: float = _MOST_STEP) -> str | None:
     """Return the clock of `_EPOCHS` that stamps are of; None if of none.
 
-    `values` ((n,)). `column`: its name. Stamps of 2000 to 2045 decide; of days, also the step: as
-    seconds, no inertial sensor would have it.
+    `values` ((n,)). `column`: its name. Stamps of 2000 to 2045 decide; of days, also the step, at
+    most `most_step`: as seconds, no sensor would have it.
     """
     if values.dtype.kind not in "iuf" or values.size < 2 or not values[0] > 36_525.0:
         return None  # as of most logs
@@ -269,7 +270,7 @@ def epoch_of(values: NDArray[Any], column: str = "") -> str | None:
             return name
         steps = np.diff(values)
         forward = steps[steps > 0.0]
-        if values.dtype.kind == "f" and forward.size and np.median(forward) <= _MOST_STEP:
+        if values.dtype.kind == "f" and forward.size and np.median(forward) <= most_step:
             return name
     return None
 
@@ -449,19 +450,23 @@ def as_rows(parts: Sequence[NDArray[Any]]) -> NDArray[np.float64] | None:
 
 
 def ticks_of(
-    raw: RawLog, source: str, unit: str | None = None, order: str | None = None
+    raw: RawLog,
+    source: str,
+    unit: str | None = None,
+    order: str | None = None,
+    most_step: float = _MOST_STEP,
 ) -> tuple[NDArray[Any], bool]:
     """Return stamps as numbers; dates and times of day as nanoseconds, and True.
 
     `unit`: that of the column, if stated. `order`: of dates (`units.DATE_ORDERS`), if stated.
-    Nanoseconds count from 1970, or, without a date, from a midnight. DataError: a stamp is
-    neither, or of another kind than those before it.
+    `most_step`: as of `epoch_of`. Nanoseconds count from 1970, or, without a date, from a midnight.
+    DataError: a stamp is neither, or of another kind than those before it.
     """
     values = raw.columns[source]
     if values.dtype.kind == "M":
         return values.astype("datetime64[ns]").astype(np.int64), True
     if values.dtype.kind != "O":
-        epoch = epoch_of(values, source) if unit is None else None
+        epoch = epoch_of(values, source, most_step) if unit is None else None
         if epoch is None:
             return numbers(raw, source, "time"), False
         return nanoseconds_of_epoch(values, epoch), True

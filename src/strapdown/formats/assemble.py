@@ -544,8 +544,9 @@ def _own_clocks(raw: RawLog, found: dict[str, Column]) -> dict[str, Column]:
         return {}
     if usual and any(np.array_equal(stamps[0], s) for s in stamps[1:]):
         return {}
-    if any(not np.isfinite(s).any() for s in stamps):
-        return {}
+    for stamp in (s[np.isfinite(s)] for s in stamps):
+        if stamp.size < 2 or (np.diff(stamp) < 0).any() or stamp[0] == stamp[-1]:
+            return {}  # a name that ends in t may be that of a temperature
     first, last = max(map(np.nanmin, stamps)), min(map(np.nanmax, stamps))
     return out if first < last else {}
 

@@ -591,7 +591,9 @@ class _Top:
             if below and over is not None:
                 names, over = over, lines[2]
             bare = [_UNIT.sub("", n) for n in names if n]
-            grouped = over is not None and len(set(bare)) < len(bare) and _are_groups(over)
+            grouped = len(set(bare)) < len(bare) and (
+                over is not None and (_are_groups(over) or _are_runs(over))
+            )
             if grouped and over is not None:
                 names = [f"{g} {n}".strip() for g, n in zip(_filled(over), names, strict=True)]
             del self.above[len(self.above) - 1 - bool(below) - grouped - len(marks) :]
@@ -653,10 +655,12 @@ class _Top:
                 self.units = {short[name]: unit for name, unit in self.units.items()}
         held = dict(zip(self.names, columns, strict=True))
         said = [line[:LONGEST] for line in self.above]
+        held = with_one_clock(_vectors_apart(held), self.units, findings, name)
+        held, rows = _one_row_a_stamp(held, rows)
         return RawLog(
             name=name,
             files=files,
-            columns=with_one_clock(held, self.units, findings, name),
+            columns=held,
             rows=rows,
             units=self.units,
             triad_units=stated_units(said, held),
@@ -666,6 +670,66 @@ class _Top:
             # Comments of the form ``# key: value``, as strapdown writes them.
             **stated_by({m[1]: m[2] for line in said if (m := _META.match(line))}),
         )
+
+
+# Cells that hold a vector, and tables of one value a row.
+
+
+_CELL = re.compile(rf"\s*[\[({{]\s*{_DECIMAL}(?:\s*[,;]\s*|\s+){_DECIMAL}.*[\])}}]\s*")
+#: Most parts of a vector, and most names of values.
+VECTOR, VALUES = 16, 64
+_VALUE_NAMES = ("value", "val", "values", "reading", "data", "wert", "valor")
+
+
+def _vectors_apart(held: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Take apart columns whose cells are vectors, ``[0.1, 0.2, 0.3]``."""
+    out: dict[str, NDArray[Any]] = {}
+    for name, values in held.items():
+        out[name] = values
+        if values.dtype.kind != "O" or not values.size or not _CELL.fullmatch(str(values[0])):
+            continue
+        cells = [re.split(r"[\s,;]+", str(v).strip(" \t[](){}")) for v in values]
+        width = len(cells[0])
+        with suppress(ValueError):
+            if width <= VECTOR and all(len(cell) == width for cell in cells):
+                parts = np.array(cells, dtype=np.float64)
+                del out[name]
+                out |= {f"{name}[{k}]": parts[:, k] for k in range(width)}
+    return out
+
+
+def _one_row_a_stamp(
+    held: dict[str, NDArray[Any]], rows: NDArray[np.int64]
+) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+    """Put values that have a row each, under the name of their axis, into one row a stamp.
+
+    The names are in a column, ``gyro_x``, or in two, the sensor and its axis.
+    """
+    clocks = [n for n in held if read_name(n).quantity == "time"]
+    texts = [n for n, v in held.items() if v.dtype.kind == "O" and n not in clocks]
+    values = [n for n in held if n.strip().lower() in _VALUE_NAMES]
+    if len(clocks) != 1 or len(values) != 1 or len(texts) not in (1, 2) or len(held) > 5:
+        return held, rows
+    words = [held[n].astype(str) for n in texts]
+    names = words[0] if len(words) == 1 else np.char.add(np.char.add(words[0], " "), words[1])
+    known, of = np.unique(names, return_inverse=True)
+    quantities = {str(read_name(str(n)).quantity) for n in known[:VALUES]}
+    if known.size > VALUES or not {"gyro_x", "gyro_y", "gyro_z"} <= quantities:
+        return held, rows
+    clock = held[clocks[0]]
+    stamps, first, at = np.unique(
+        clock.astype(str) if clock.dtype.kind == "O" else clock,
+        return_index=True,
+        return_inverse=True,
+    )
+    # In the order of the file, which of texts is not theirs.
+    order = np.argsort(first)
+    first, at = first[order], np.argsort(order)[at]
+    if np.unique(at * known.size + of).size < at.size:
+        return held, rows  # a stamp has two values of one name
+    table = np.full((known.size, stamps.size), np.nan)
+    table[of, at] = held[values[0]]
+    return {clocks[0]: clock[first]} | {str(n): table[k] for k, n in enumerate(known)}, rows[first]
 
 
 # Sampling rate and units of sensors, stated in the lines above a table.
@@ -803,6 +867,9 @@ def _first_row(numbered: Lines, kinds: Sequence[str]) -> tuple[int, str | None, 
             # Lines of a preamble may be filled up with separators.
             full = next((m for m, names in enumerate(top) if all(names)), None)
             first = 1 + (_are_groups(top[0]) if full is None else full)
+            # Groups whose names are repeated, over their members.
+            if full is not None and first < k and _are_runs(top[full]) and not data[first]:
+                first += 1
             if first < k and _says_calibrated(numbered[first][1], separator):
                 first += 1
             if first < k and _units(numbered[first][1], separator, width, kinds):
@@ -839,6 +906,8 @@ def _named(line: str, separator: str | None, width: int) -> list[str] | None:
         # The mark may be the name of a column of numbers of rows.
         whole = fields_of(line.strip(), separator)
         fields = whole if len(whole) == width and not whole[0].strip(_MARKS) else fields
+    if bare != line and len(fields) == width and not fields[0]:
+        fields = [line.strip()[: len(line.strip()) - len(bare)].strip() or "#", *fields[1:]]
     if len(fields) == width + 1 and not fields[-1]:
         fields = fields[:-1]
     return fields if len(fields) == width and any(fields) and not are_data(fields) else None
@@ -854,6 +923,12 @@ def _are_groups(fields: list[str]) -> bool:
     """Whether a line names groups of columns: some fields are empty, each name is there once."""
     full = [f for f in fields if f]
     return len(fields) > len(full) > 0 and len(set(full)) == len(full)
+
+
+def _are_runs(fields: list[str]) -> bool:
+    """Whether a line names groups of columns by repeating each name over its members."""
+    names = [name for name, _ in itertools.groupby(fields)]
+    return all(fields) and len(fields) > len(names) == len(set(names)) > 1
 
 
 def _filled(fields: list[str]) -> list[str]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
-from strapdown.formats.arrays import is_stamp, numbers, ticks_of
+from strapdown.formats.arrays import STEP_OF_FIXES, is_stamp, numbers, ticks_of
 from strapdown.formats.clocks import clock_of_name
 from strapdown.formats.columns import (
     INDEXED,
@@ -468,7 +468,7 @@ def clock_by_values(raw: RawLog) -> str:
         elif values.dtype.kind == "O":
             if values.size and ":" in (first := str(values[0])) and is_stamp(first):
                 dated.append(name)
-        elif name.strip().lower() in _TICKS and advances(values):
+        elif name.strip().lower() in _TICKS and (advances(values) or advances(values[::-1])):
             ticks.append(name)
     found = dated or ticks
     return found[0] if len(found) == 1 else ""
@@ -675,7 +675,7 @@ def _three_of(raw: RawLog, quantity: str, source: str) -> list[str]:
             source=source,
             width=width,
             of_what=quantity,
-            width_2=width - 3,
+            first=f"{source}[{width - 3}]",
         )
     if width >= 3 and (not index or index.rstrip("]").isdecimal()):
         first = int(index.rstrip("]")) if index else 0
@@ -732,7 +732,7 @@ class Found:
         `order`: of dates (`units.DATE_ORDERS`), if stated.
         DataError: a stamp is neither a number nor a date.
         """
-        ticks, dated = ticks_of(raw, self.source, order=order)
+        ticks, dated = ticks_of(raw, self.source, order=order, most_step=STEP_OF_FIXES)
         time = np.asarray(ticks * (1e-9 if dated else self.factor), dtype=np.float64)
         finite = time[np.isfinite(time)]
         first = float(finite[0]) if finite.size else 0.0

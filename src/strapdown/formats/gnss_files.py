@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.formats import comma2k19, open_stream
-from strapdown.formats.arrays import epoch_of, numbers, open_dates
+from strapdown.formats.arrays import STEP_OF_FIXES, epoch_of, numbers, open_dates
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock
 from strapdown.formats.coordinates import height_unit_open, with_degrees
 from strapdown.formats.find_columns import Found, fix_columns, names_of_quantities
@@ -68,6 +68,8 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
 
     place, datum = _place(raw, found, values, options)
     time, clock = _time(raw, found["time"], options.units.get("time"))
+    if time.size > 2 and (np.diff(time) < 0.0).all():
+        return fixes_of_columns(raw.backward(), options)
     if "week" in found and clock.name == RELATIVE:
         clock = Clock(GPS)
     if "week" in found and clock.name == GPS:
@@ -416,7 +418,7 @@ def _time(raw: RawLog, found: Found, stated: str | None) -> tuple[Array, Clock]:
     order = stated if stated in DATE_ORDERS else None
     time, name, dated = found.stamps(raw, order)
     values, source = raw.columns[found.source], found.source
-    if dated and (epoch := epoch_of(values, source)) is not None:
+    if dated and (epoch := epoch_of(values, source, STEP_OF_FIXES)) is not None:
         raw.note("io.stamps-of-epoch", "time", source=source, epoch=epoch)
     if dated and order is None and (readings := open_dates(values)):
         raw.warn("io.date-order-open", "time", source=source, date=values[0], **readings)

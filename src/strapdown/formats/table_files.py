@@ -25,7 +25,7 @@ from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.known_formats import from_json, under
 from strapdown.formats.phone_apps import with_force_summed
 from strapdown.formats.recording import RawLog
-from strapdown.formats.sensor_folder import peek
+from strapdown.formats.sensor_folder import first_line, peek
 from strapdown.formats.signs import Signs, first_bytes, head
 from strapdown.formats.vocabularies import FIXES
 from strapdown.parsers import parse
@@ -83,7 +83,11 @@ PACKED_TITLE = "one file in .gz, .bz2, .xz, .zst or .zip"
 def _holds_one(path: Path) -> bool:
     if path.suffix.lower() != ".zip":
         return first_bytes(path, 6).startswith(tuple(PACKED))
-    return len(peek(path)) == 1
+    members = peek(path)
+    if len(members) != 1 or read_name(f"{members[0].stem} x").quantity is not None:
+        return False  # of one sensor, which `sensor_folder` reads
+    line = first_line(members[0])
+    return line[:1] in tuple("[{") or len(csv.fields_of(line, csv.separator_of(line))) > 3
 
 
 detect_packed = Signs(also=_holds_one)
@@ -91,12 +95,16 @@ detect_packed = Signs(also=_holds_one)
 
 def read_packed(path: Path) -> RawLog:
     """Read the samples of the file in it."""
-    return _read_inside(path, "imu")
+    raw = _read_inside(path, "imu")
+    assert isinstance(raw, RawLog)
+    return raw
 
 
 def read_packed_fixes(path: Path) -> RawLog | Fixes:
     """Read the fixes of the file in it."""
-    return _read_inside(path, "gnss")
+    raw = _read_inside(path, "gnss")
+    assert isinstance(raw, RawLog | Fixes)
+    return raw
 
 
 def _read_inside(path: Path, stream: str) -> Any:

@@ -234,3 +234,47 @@ def test_ticks_are_asked_about(tmp_path, factor, unit):
 def test_seconds_of_a_day_pass_midnight(tmp_path):
     stamps = [f"{s:.2f}" for s in (86_390.0 + MS / 1000) % 86_400]
     check(sd.read_imu(table(tmp_path, "seconds_of_day", stamps)), None)
+
+
+# The same clocks of fixes, one a second: the part of a second stays, and a day has larger steps.
+
+
+SECOND = [START + timedelta(seconds=k) for k in range(60)]
+OF_FIXES = {
+    "timestamp_s,timestamp_us": [(int(UNIX) + k, 250_000) for k in range(60)],
+    "Fecha,Hora": [(f"{at:%d.%m.%Y}", f"{at:%H:%M:%S.%f}") for at in SECOND],
+    "ddmmyy,hhmmss": [(f"{at:%d%m%y}", f"{at:%H%M%S.%f}") for at in SECOND],
+    "datenum": [(DATENUM + (33_330.25 + k) / 86_400,) for k in range(60)],
+    "Time": [(DAYS + 25_569 + (33_330.25 + k) / 86_400,) for k in range(60)],
+    "ticks": [(621_355_968_000_000_000 + int((UNIX + k) * 10**7),) for k in range(60)],
+    "time": [(UNIX + k,) for k in range(60)],
+}
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("names", OF_FIXES)
+def test_clocks_of_fixes(tmp_path, names, turned):
+    rows = [
+        ",".join(map(str, [*stamp, 48.0 + k / 1e5, 11.0, 500.0]))
+        for k, stamp in enumerate(OF_FIXES[names])
+    ]
+    path = tmp_path / "fixes.csv"
+    lines = [f"{names},lat,lon,alt_ellipsoid", *(rows[::-1] if turned else rows)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    fixes = sd.read_gnss(path, position_sd_m=1.0)
+    assert fixes.attrs["clock"] == "unix"
+    stamps = fixes.index + fixes.attrs["clock_origin"]
+    np.testing.assert_allclose(stamps, UNIX + np.arange(60), atol=2e-5)
+    np.testing.assert_allclose(fixes["lat"], 48.0 + np.arange(60) / 1e5, rtol=1e-14)
+    assert turned == ("io.rows-in-descending-order" in codes(fixes))
+
+
+def test_the_order_of_a_date_of_fixes(tmp_path):
+    rows = [f"{at:%d/%m/%Y},{at:%H:%M:%S},48.0,11.0,500.0" for at in SECOND]
+    path = tmp_path / "fixes.csv"
+    path.write_text("\n".join(["date,time,lat,lon,alt_ellipsoid", *rows]) + "\n", encoding="utf-8")
+    fixes = sd.read_gnss(path, position_sd_m=1.0)
+    assert fixes.attrs["clock"] == "relative"
+    assert "io.date-order-open" in codes(fixes)
+    stated = sd.read_gnss(path, position_sd_m=1.0, units={"time": "d/m/y"})
+    assert stated.index[0] + stated.attrs["clock_origin"] == UNIX - 0.25

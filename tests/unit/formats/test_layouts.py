@@ -205,3 +205,63 @@ def test_a_bomb_and_an_archive_in_another_are_refused(tmp_path):
     path.write_bytes(gzip.compress(b"0" * (300 << 20)))
     with pytest.raises(DataError, check=coded("io.unpacks-too-far")):
         sd.read_imu(path)
+
+
+# Names in two lines, vectors in cells, and one value a row.
+
+
+HEADS = {
+    "groups repeated": ["time_s,gyro,gyro,gyro,accel,accel,accel", ",x,y,z,x,y,z"],
+    "and units": [
+        "time,gyro,gyro,gyro,accel,accel,accel",
+        ",x,y,z,x,y,z",
+        "s,rad/s,rad/s,rad/s,m/s2,m/s2,m/s2",
+    ],
+    "groups once": ["time_s,gyro,,,accel,,", ",x,y,z,x,y,z"],
+}
+
+
+@pytest.mark.parametrize("head", HEADS)
+def test_names_in_two_lines(tmp_path, head):
+    path = written(tmp_path, "log.csv", [*HEADS[head], *table(ROWS)[1:]])
+    check(sd.read_imu(path, units=UNITS))
+
+
+def test_a_mark_that_names_the_numbers_of_rows(tmp_path):
+    rows = [[k, *row] for k, row in enumerate(ROWS, 1)]
+    check(sd.read_imu(written(tmp_path, "log.csv", table(rows, f"#,time_s,{NAMES}"))))
+
+
+@pytest.mark.parametrize("form", ['"[{}, {}, {}]"', "({} {} {})", '"{{{};{};{}}}"'])
+def test_vectors_in_cells(tmp_path, form):
+    rows = [[r[0], form.format(*r[1:4]), form.format(*r[4:])] for r in ROWS]
+    path = written(tmp_path, "log.csv", table(rows, "time_s,gyro,accel"))
+    check(sd.read_imu(path, units=UNITS))
+
+
+@pytest.mark.parametrize("apart", [False, True])
+@pytest.mark.parametrize("texts", [False, True])
+def test_one_value_a_row(tmp_path, apart, texts):
+    """Names as ``gyro_x``, or sensor and axis in two columns; 9:59 is before 10:00."""
+    rows = []
+    for k, row in enumerate(ROWS):
+        stamp = (
+            f"9:59:{58 + k // 100}.{k % 100:02d}"
+            if k < 200
+            else f"10:00:0{(k - 200) // 100}.{k % 100:02d}"
+        )
+        for quantity, value in zip([*GYRO, *ACCEL], row[1:], strict=True):
+            name = quantity.split("_") if apart else [quantity]
+            rows.append([stamp if texts else row[0], *name, value])
+    names = "time,sensor,axis,value" if apart else "time,name,value"
+    imu = sd.read_imu(written(tmp_path, "log.csv", table(rows, names)), units=UNITS)
+    np.testing.assert_array_equal(imu[GYRO], RATES)
+    np.testing.assert_array_equal(imu[ACCEL], FORCE)
+    np.testing.assert_allclose(imu.index - imu.index[0], np.arange(N) / 100, atol=1e-9)
+
+
+def test_a_temperature_is_no_clock_of_its_sensor(tmp_path):
+    """gyro_t is warm, from 2.0 to 2.9: within the stamps, which it does not follow."""
+    rows = [[r[0], 2.0 + (k % 10) / 10, *r[1:4], r[0], *r[4:]] for k, r in enumerate(ROWS)]
+    names = "time_s,gyro_t,gyro_x,gyro_y,gyro_z,accel_t,accel_x,accel_y,accel_z"
+    check(sd.read_imu(written(tmp_path, "log.csv", table(rows, names)), units=UNITS))

@@ -1102,7 +1102,7 @@ def test_a_missing_library_names_the_extra(tmp_path, monkeypatch, name, make):
     [
         ("log.bbl", b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n", "blackbox"),
         ("z1.raw", b"UUz1(" + bytes(60), "openimu"),
-        ("flight.ulg.gz", b"\x1f\x8b\x08" + bytes(30), "unpacked"),
+        ("flight.7z", b"7z\xbc\xaf\x27\x1c" + bytes(30), "unpacked"),
         ("base.obs", b"     3.04           O".ljust(60) + b"RINEX VERSION / TYPE\n", "RTKLIB"),
         ("ride.mp4", bytes(4) + b"ftypmp42" + bytes(20), "exiftool"),
     ],
