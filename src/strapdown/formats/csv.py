@@ -280,10 +280,10 @@ _SENTENCE = re.compile(r"(\$\w+)(,[^*]*)\*[0-9A-Fa-f]{2}\s*")
 _TAGGED = re.compile(r"\s*([A-Za-z]\w*):[ \t]*(?=[+-]?[\d.][^:=]*$)")
 # Stamps and numbers between words. A digit of a name or a unit is none, nor one whose sign may be
 # a part of the word before it.
-_DECIMAL = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+_UNSIGNED = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _PRINTED = re.compile(
     r"(?<![\w.])(?:\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?(?:Z|[+-]\d\d:?\d\d)?(?![\w:])"
-    rf"|(?<![\w.^])[+-]{_DECIMAL}|(?<![\w.^+-]){_DECIMAL}|(?<!\w)[+-]?(?:nan|inf)(?!\w)",
+    rf"|(?<![\w.^])[+-]{_UNSIGNED}|(?<![\w.^+-]){_UNSIGNED}|(?<!\w)[+-]?(?:nan|inf)(?!\w)",
     re.I,
 )
 # What is between the values of a vector, what ends a label, and what parts its words.
@@ -675,6 +675,7 @@ class _Top:
 # Cells that hold a vector, and tables of one value a row.
 
 
+_DECIMAL = rf"[+-]?{_UNSIGNED}"
 _CELL = re.compile(rf"\s*[\[({{]\s*{_DECIMAL}(?:\s*[,;]\s*|\s+){_DECIMAL}.*[\])}}]\s*")
 #: Most parts of a vector, and most names of values.
 VECTOR, VALUES = 16, 64
