@@ -385,7 +385,7 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
         return []
     out = [Finding("io.columns-not-used", file=raw.name, severity="note", names=names)]
     clocks = [n for n in names if _is_clock(n)]
-    if clocks and "time" in found:
+    if clocks and "time" in found and not raw.stated:
         add_note(
             out,
             "io.clock-of-several",
