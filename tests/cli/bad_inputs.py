@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import io
 import struct
 import zipfile
@@ -273,6 +274,21 @@ def trajectory(
     return make, options, True, "simulate"
 
 
+def packed(pack: Callable[[bytes], bytes]) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        path = folder / "log.csv.gz"
+        path.write_bytes(pack("\n".join([HEADER, *rows()]).encode()))
+        return path
+
+    return make
+
+
+def sections(folder: Path) -> Path:
+    force = [f"{0.01 * k:.2f},0.1,0.2,9.8" for k in range(20)]
+    fixes = [f"{k},48.0,11.0,500.0" for k in range(20)]
+    return text(folder / "log.csv", [*force, "time,lat,lon,alt", *fixes], "time_s,ax,ay,az")
+
+
 @dataclass(frozen=True)
 class Case:
     """One bad input.
@@ -290,6 +306,9 @@ class Case:
 CASES = [
     Case("An empty file", empty),
     Case("An empty binary file", empty_mat),
+    Case("A compressed file that was cut", packed(lambda data: gzip.compress(data)[:-20])),
+    Case("An archive in an archive", packed(lambda data: gzip.compress(gzip.compress(data)))),
+    Case("Tables below each other, none of a gyro", sections),
     Case("A header, and nothing under it", lambda f: text(f / "log.csv", [])),
     Case(
         "A last line that was cut",
@@ -297,9 +316,10 @@ CASES = [
         fails=False,
     ),
     Case("A line with too many fields", with_row(7, "0.07,0.1,-0.2,0.3,0.4")),
-    Case("Text in a column of numbers", with_row(7, "0.07,0.1,n/a,0.3")),
+    Case("Text in a column of numbers", with_row(7, "0.07,0.1,off,0.3")),
     Case("NaN", with_row(7, "0.07,0.1,nan,0.3")),
     Case("An empty field", with_row(7, "0.07,0.1,,0.3")),
+    Case("A code of a missing value", with_row(7, "0.07,0.1,-9999,0.3")),
     Case("Infinity", with_row(7, "0.07,0.1,inf,0.3")),
     Case("NaN, with --repair", with_row(7, "0.07,0.1,nan,0.3"), ("--repair",), False),
     Case("A stamp twice", with_row(7, "0.06,0.1,-0.2,0.3")),
@@ -531,7 +551,7 @@ CASES = [
     ),
     Case(
         "A member of an archive with text among the numbers",
-        recording_zip(Gyroscope=_sensor_logger("0.1,0.2,0.3").replace("0.07,0.1", "0.07,n/a")),
+        recording_zip(Gyroscope=_sensor_logger("0.1,0.2,0.3").replace("0.07,0.1", "0.07,off")),
     ),
     Case(
         "A phone of unknown platform",

@@ -26,7 +26,7 @@ from strapdown.formats.clocks import (
     spread_bursts,
     with_clock,
 )
-from strapdown.formats.columns import parse_axes, read_name
+from strapdown.formats.columns import LONGEST, parse_axes, read_name
 from strapdown.formats.find_columns import (
     AXES,
     Column,
@@ -385,7 +385,7 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
         return []
     out = [Finding("io.columns-not-used", file=raw.name, severity="note", names=names)]
     clocks = [n for n in names if _is_clock(n)]
-    if clocks and "time" in found:
+    if clocks and "time" in found and not raw.stated:
         add_note(
             out,
             "io.clock-of-several",
@@ -527,7 +527,8 @@ def _own_clocks(raw: RawLog, found: dict[str, Column]) -> dict[str, Column]:
     Empty if the triads have one clock, or clocks whose stamps do not overlap: they are of others.
     """
     names, usual = list(raw.columns), found.get("time")
-    clocks = [n for n in names if raw.columns[n].dtype.kind in "iuf" and _OWN_CLOCK.fullmatch(n)]
+    likely = [n for n in names if raw.columns[n].dtype.kind in "iuf" and len(n) < LONGEST]
+    clocks = [n for n in likely if _OWN_CLOCK.fullmatch(n)]
     out: dict[str, Column] = {}
     for triad in ("gyro", "accel", "mag"):
         if f"{triad}_x" not in found:

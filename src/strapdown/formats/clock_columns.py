@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import Finding, add_note
 from strapdown.formats.arrays import is_date, is_day_time, is_stamp
-from strapdown.formats.columns import read_name
+from strapdown.formats.columns import LONGEST, read_name
 from strapdown.units import unit_of
 
 Columns = dict[str, NDArray[Any]]
@@ -34,6 +34,8 @@ def with_one_clock(
     for messages.
     """
     out = dict(columns)
+    if max(map(len, out), default=0) > LONGEST:
+        return out  # no pattern is searched in the names of a damaged file
     for join in (_components, _date_and_time, _whole_and_part, _one_number):
         out = join(out, units, findings, file)
     return out
@@ -367,6 +369,9 @@ def _says(name: str, word: str) -> bool:
 _MULTIPLE = re.compile(
     r"(?P<name>.*?)[\s_\[(]+(?P<count>\d+(?:\.\d+)?)[\s_]*(?P<unit>s|ms|us|µs|μs|ns)[\])]?$", re.I
 )
+_NAMED = re.compile(
+    r"\b(h|hr|hrs|hours|d|days)\W*$|_(h|hr|hrs|hours|d|days)$|ntp|labview|c[of]", re.I
+)
 _LONG = re.compile(r"(?P<name>.*?)[\s_\[(]+(?P<unit>h|hr|hrs|hours|d|days)[\])]?$", re.I)
 _OF_DAY = re.compile(r"of[\s_]?day|\bsod\b", re.I)
 #: Seconds from the origin of a clock to 1970, by words of its name.
@@ -384,6 +389,10 @@ def _one_number(
 ) -> Columns:
     for name, values in list(columns.items()):
         if values.dtype.kind not in "iuf" or not values.size or name in units:
+            continue
+        # Most columns are none of these, and long.
+        digits = 2.0e13 <= float(values[0]) < 2.046e16
+        if not (digits or re.search(r"\d|of.?day|sod", name) or _NAMED.search(name)):
             continue
         if not np.isfinite(values).all():
             continue

@@ -122,6 +122,8 @@ def read_name(name: str, of: Vocabulary = LOGS, unit: str = "") -> ColumnName:
     ``gps_lat``, ``Lateral Delta-V (km/h)``. `of`: vocabulary of its file. `unit`: stated apart from
     the name, as in a row of units; counts where the name has none, and first in a crash record.
     """
+    if len(name) > MOST_LETTERS:
+        return ColumnName(None)
     return (_read_once if len(name) <= LONGEST else _read_name)(name, of, unit)
 
 
@@ -154,6 +156,8 @@ def _read_name(name: str, of: Vocabulary, unit: str) -> ColumnName:
 
 #: Names of up to so many letters are kept with their meaning: a table asks for each several times.
 LONGEST = 100
+#: Longer names say nothing: those of a damaged file, in which searching takes minutes.
+MOST_LETTERS = 2000
 _read_once = lru_cache(maxsize=1 << 14)(_read_name)
 
 

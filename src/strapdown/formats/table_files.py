@@ -20,6 +20,7 @@ from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats import csv, join
 from strapdown.formats.android_events import joined, kind_of
 from strapdown.formats.arrays import raw_log
+from strapdown.formats.clock_columns import with_one_clock
 from strapdown.formats.columns import read_name
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.known_formats import from_json, under
@@ -228,7 +229,7 @@ def read_json_table(path: Path) -> RawLog:
                 [np.nan if v is None else v for v in values], dtype=None if whole else np.float64
             )
     raw = RawLog(path.name, (path,), columns, rows=np.array(rows), findings=findings)
-    return with_force_summed(raw)
+    return with_force_summed(_with_one_clock(raw))
 
 
 def read_json_fixes(path: Path) -> RawLog:
@@ -290,7 +291,7 @@ def _of_columns(path: Path, content: Any) -> RawLog:
             meta[str(name)] = given
             continue
         arrays[str(name)] = _array_of(given)
-    return with_force_summed(raw_log(path, arrays, {}, meta))
+    return with_force_summed(_with_one_clock(raw_log(path, arrays, {}, meta)))
 
 
 def _are_names(value: Any, width: int) -> bool:
@@ -424,6 +425,13 @@ def _array_of(values: list[Any]) -> NDArray[Any]:
         return np.array(values, dtype=None if all(type(v) is int for v in values) else float)
     except (TypeError, ValueError):
         return _dates_of(values)
+
+
+def _with_one_clock(raw: RawLog) -> RawLog:
+    """Join a clock in parts (`clock_columns`); the same log."""
+    if not raw.stated and not raw.checked:
+        raw.columns = with_one_clock(raw.columns, raw.units, raw.findings, raw.name)
+    return raw
 
 
 def _dates_of(values: list[Any]) -> NDArray[Any]:
@@ -683,7 +691,8 @@ def read_parquet(path: Path) -> RawLog:
     ``sampling``, ``axes`` and a rate of the table, are understood.
     """
     found = parse("parquet.table", path, room=room)
-    return with_force_summed(raw_log(path, found["arrays"], found["units"], found["meta"]))
+    raw = raw_log(path, found["arrays"], found["units"], found["meta"])
+    return with_force_summed(_with_one_clock(raw))
 
 
 def write_parquet(

@@ -9,6 +9,7 @@ from __future__ import annotations
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
+import pandas as pd
 import pytest
 from tests.coded import coded
 
@@ -278,3 +279,17 @@ def test_the_order_of_a_date_of_fixes(tmp_path):
     assert "io.date-order-open" in codes(fixes)
     stated = sd.read_gnss(path, position_sd_m=1.0, units={"time": "d/m/y"})
     assert stated.index[0] + stated.attrs["clock_origin"] == UNIX - 0.25
+
+
+@pytest.mark.parametrize("form", ["json", "parquet"])
+def test_a_clock_in_parts_in_other_tables(tmp_path, form):
+    columns = {"sec": SECONDS, "nsec": US % 1_000_000 * 1000}
+    held = {n: np.zeros(N) - 9.81 * n.startswith("accel_z") for n in NAMES.split(",")}
+    held |= dict(zip(NAMES.split(","), RATES.T, strict=False))
+    frame = pd.DataFrame({**columns, **held})
+    path = tmp_path / f"log.{form}"
+    if form == "json":
+        path.write_text(frame.to_json(orient="records"), encoding="utf-8")
+    else:
+        frame.to_parquet(path)
+    check(sd.read_imu(path))
