@@ -655,7 +655,8 @@ class _Top:
                 self.units = {short[name]: unit for name, unit in self.units.items()}
         held = dict(zip(self.names, columns, strict=True))
         said = [line[:LONGEST] for line in self.above]
-        held = with_one_clock(_vectors_apart(held), self.units, findings, name)
+        held = _vectors_apart(_without_units(held, self.units))
+        held = with_one_clock(held, self.units, findings, name)
         held, rows = _one_row_a_stamp(held, rows)
         return RawLog(
             name=name,
@@ -677,9 +678,24 @@ class _Top:
 
 _DECIMAL = rf"[+-]?{_UNSIGNED}"
 _CELL = re.compile(rf"\s*[\[({{]\s*{_DECIMAL}(?:\s*[,;]\s*|\s+){_DECIMAL}.*[\])}}]\s*")
+_WITH_UNIT = re.compile(rf"\s*({_DECIMAL})\s*([^\s\d.,;:+-][^\d,;:]{{0,10}}(?:\d\)?)?)\s*")
 #: Most parts of a vector, and most names of values.
 VECTOR, VALUES = 16, 64
 _VALUE_NAMES = ("value", "val", "values", "reading", "data", "wert", "valor")
+
+
+def _without_units(held: dict[str, NDArray[Any]], units: dict[str, str]) -> dict[str, NDArray[Any]]:
+    """Take one unit off all cells of a column, ``0.01 sec``, and put it among the units."""
+    out = dict(held)
+    for name, values in held.items():
+        first = _WITH_UNIT.fullmatch(str(values[0])) if values.dtype.kind == "O" else None
+        if first is None or unit_of(first[2]) is None:
+            continue
+        cells = [_WITH_UNIT.fullmatch(str(v)) for v in values]
+        numbers = [float(m[1]) for m in cells if m and m[2] == first[2]]
+        if len(numbers) == len(cells):
+            out[name], units[name] = np.array(numbers), first[2]
+    return out
 
 
 def _vectors_apart(held: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:

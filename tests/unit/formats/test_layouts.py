@@ -239,6 +239,18 @@ def test_vectors_in_cells(tmp_path, form):
     check(sd.read_imu(path, units=UNITS))
 
 
+def test_a_unit_in_every_cell(tmp_path):
+    """As `writetimetable` of MATLAB writes durations."""
+    rows = [[f"{r[0]:.2f} sec", *r[1:4], *(f"{f} m/s^2" for f in r[4:])] for r in ROWS]
+    path = written(tmp_path, "log.csv", table(rows, f"Time,{NAMES}"))
+    check(sd.read_imu(path, units={"gyro": "rad/s"}))
+    rows[7][4] = "1.0 g"
+    path = written(tmp_path, "log.csv", table(rows, f"Time,{NAMES}"))
+    mixed = sd.read_imu(path, units={"gyro": "rad/s"})
+    assert ACCEL[0] not in mixed.columns
+    assert any(f.quantity == "accel" and f.severity == "warning" for f in mixed.findings)
+
+
 @pytest.mark.parametrize("apart", [False, True])
 @pytest.mark.parametrize("texts", [False, True])
 def test_one_value_a_row(tmp_path, apart, texts):
