@@ -58,6 +58,8 @@ def with_degrees(raw: RawLog, found: Mapping[str, Found]) -> RawLog:
             changed[source] = side * np.abs(np.asarray(size, dtype=np.float64))
     places = {q: changed.get(found[q].source, raw.columns[found[q].source]) for q in _ANGLES}
     if all(v.dtype.kind in "iuf" for v in places.values()):
+        if not any(found[q].stated for q in _ANGLES):
+            _refuse_radians_open(raw, places)
         form, scaled = _in_one_number(places)
         changed |= {found[q].source: v for q, v in scaled.items()}
         # A name that says it (latitudeE7) says that heights are not scaled likewise.
@@ -164,6 +166,23 @@ def _in_one_number(places: Mapping[str, NDArray[Any]]) -> tuple[str, dict[str, A
         whole = {q: np.trunc(v / 100.0) for q, v in values.items()}
         return "ddmm.mmmm", {q: whole[q] + (v - 100.0 * whole[q]) / 60.0 for q, v in values.items()}
     return "", {}
+
+
+#: Largest latitude and longitude in radians; as degrees they are in the sea off Guinea. Nearer to
+#: zero than this, which is 1 km in degrees, either may be an origin.
+_RADIANS, _ORIGIN = {"lat": 0.5 * np.pi, "lon": np.pi}, 0.01
+
+
+def _refuse_radians_open(raw: RawLog, places: Mapping[str, NDArray[Any]]) -> None:
+    """Ask for the unit of coordinates that are as well in radians, somewhere on the Earth."""
+    size = {q: np.abs(np.asarray(v, dtype=np.float64)) for q, v in places.items()}
+    if all(v.size and np.isfinite(v).any() for v in size.values()):
+        largest = {q: float(np.nanmax(v)) for q, v in size.items()}
+        whole = all((v[np.isfinite(v)] % 1.0 == 0.0).all() for v in size.values())
+        inside = all(v <= _RADIANS[q] for q, v in largest.items())
+        if inside and not whole and max(largest.values()) > _ORIGIN:
+            first = {q: float(v[np.isfinite(v)][0]) for q, v in places.items()}
+            raise raw.fault("io.degrees-or-radians", "lat, lon", lat=first["lat"], lon=first["lon"])
 
 
 def _refuse_open_scale(raw: RawLog, degrees: Mapping[str, Array]) -> None:

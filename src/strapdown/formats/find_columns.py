@@ -19,6 +19,7 @@ from strapdown.formats.columns import (
     ColumnName,
     clocks_with_unit,
     read_name,
+    split_brackets,
 )
 from strapdown.formats.recording import INFERRED, STATED, Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import (
@@ -30,7 +31,7 @@ from strapdown.formats.vocabularies import (
     Quantity,
     Vocabulary,
 )
-from strapdown.units import ACCEL_UNITS, GYRO_UNITS, OF_TABLES, unit_of
+from strapdown.units import ACCEL_UNITS, GYRO_UNITS, OF_TABLES, find_unit, unit_of
 
 Array = NDArray[np.float64]
 AXES = "xyz"
@@ -602,6 +603,35 @@ def _unit_of(raw: RawLog, column: str) -> str | None:
     if column in raw.units:
         return unit_of(raw.units[column])
     return read_name(column).unit or _ros_unit(raw, column)
+
+
+#: Words in brackets behind a name, or in a row of units, that say no unit.
+_NO_UNITS = re.compile(
+    r"[\W\d_]*|[xyz]|x[- ]?axis|y[- ]?axis|z[- ]?axis|none|n/?a|null|unitless|dimensionless|vector|"
+    r"(?:un)?calib\w*|(?:un)?compensated|corrected|filter\w*|smooth\w*|sensor|device|body|float\w*|"
+    r"double|(?:imu|sensor|unit)[\W_]?\w*|left|right|front|rear|back|up|down|roll|pitch|yaw|"
+    r"\w*[. ]\w*",
+    re.I,
+)
+
+
+#: Quantities whose units a sensor may have; degrees are often those per second.
+_OF_TRIADS = {
+    "gyro": ("rate", "angle"),
+    "accel": ("acceleration", "change of velocity", "velocity"),
+    "mag": ("magnetic field", "magnetic field, relative", "acceleration"),
+}
+
+
+def stated_word(raw: RawLog, column: str, triad: str) -> str:
+    """Return the word that a file has in place of the unit of a sensor's column; empty if none.
+
+    Of a row of units, or in brackets behind the name, where it is no unit of such a sensor.
+    """
+    text = raw.units.get(column, "").strip().strip("[]()").strip()
+    text = text or split_brackets(column)[1].strip()
+    known = not text or find_unit(text, _OF_TRIADS[triad])
+    return "" if known or _NO_UNITS.fullmatch(text) else text
 
 
 ROS_FIELD = re.compile(rf"(.*({'|'.join(ROS)}))[./][xyz]")

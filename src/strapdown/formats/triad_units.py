@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.arrays import as_rows, numbers
 from strapdown.formats.columns import parse_axes, read_name
-from strapdown.formats.find_columns import AXES, Column
+from strapdown.formats.find_columns import AXES, Column, stated_word
 from strapdown.formats.inference.conclusion import THRESHOLD, Inference
 from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
@@ -23,8 +23,10 @@ from strapdown.tables.on_disk import let_go, room
 from strapdown.units import (
     ACCEL_SUMS,
     ACCEL_UNITS,
+    COUNTS,
     GYRO_SUMS,
     GYRO_UNITS,
+    INFERRED,
     MAG_UNITS,
     RELATIVE_FIELDS,
     factor_of,
@@ -81,9 +83,9 @@ def told_by_numbers(log: LogInUse, ticks: NDArray[Any] | None, dated: bool) -> d
     if ticks is not None and not dated:
         asked = log.options.time_unit
         unit = parse_unit(asked, "time") if asked else log.found["time"].unit
-    values, rate = log.values, log.options.rate or log.raw.rate
-    triads = values["gyro"], values.get("accel"), values.get("mag")
-    signals = Signals(ticks, *triads, time_unit=unit, rate=rate)
+    rate = log.options.rate or log.raw.rate
+    triads = {t: _in_usual_unit(log, t) for t in ("gyro", "accel", "mag")}
+    signals = Signals(ticks, **triads, time_unit=unit, rate=rate)
     said = {i.quantity: i for i in infer_signals(signals)}
     up = said.get("up_axis")
     if up is not None and up.value is not None:
@@ -91,6 +93,22 @@ def told_by_numbers(log: LogInUse, ticks: NDArray[Any] | None, dated: bool) -> d
         if stated and factor_of(stated[0], {**UNITS["accel"], **SUMS["accel"]}) < 0.0:
             said["up_axis"] = _reversed(up)
     return said
+
+
+def _in_usual_unit(log: LogInUse, triad: str) -> Array | None:
+    """Return the values of a triad; in SI where they are stated in a unit that none infers."""
+    values = log.values.get(triad)
+    if values is None or triad not in UNITS or _usual(log, triad):
+        return values
+    unit, _ = _stated_unit(log, triad) or ("", "")
+    return np.asarray(values * factor_of(unit, UNITS[triad]))
+
+
+def _usual(log: LogInUse, triad: str) -> bool:
+    """Whether the unit of a triad is not stated, or one that numbers alone may show."""
+    stated = _stated_unit(log, triad)
+    rare = UNITS[triad].keys() - {*INFERRED[triad]}
+    return stated is None or stated[0] not in rare
 
 
 def _opposite(axis: str) -> str:
@@ -137,6 +155,9 @@ def units_of_triads(log: LogInUse) -> dict[str, tuple[str, str]]:
             sure = likely is not None and likely.value and likely.confidence >= LIKELY
             unit = str(likely.value) if likely is not None and sure else "UNIT"
             counts = unit_of_counts(likely)
+            if triad == "accel" and code in ("io.unit-unknown-word", "io.unit-not-sure"):
+                log.questions.ask(error.finding, accel_unit=counts or unit)
+                continue
             if triad != "gyro":
                 # Beside a gyro whose unit is asked, that of its accelerometer is asked, too.
                 if triad == "accel" and gyro_asked:
@@ -174,9 +195,21 @@ def _without_gravity(log: LogInUse) -> bool:
 
 
 def _refuse_open(log: LogInUse, triad: str) -> None:
-    """Refuse a unit that the file leaves open: the numbers cannot decide between f and -f."""
+    """Refuse a unit that the file leaves open: the numbers cannot decide between f and -f.
+
+    Refused is also one that the file states in a word which is not known.
+    """
     raw, column = log.raw, log.found[f"{triad}_x"]
     unit = column.unit
+    word = next((w for c in log.columns(triad) if (w := stated_word(raw, c.source, triad))), "")
+    if word.lower() in COUNTS:
+        raise DataError(
+            _undecided(triad, log.said.get(f"{triad}_unit"), log.values[triad]).replace(
+                file=raw.name, quantity=triad
+            )
+        )
+    if word:
+        raise raw.fault("io.unit-unknown-word", triad, source=column.source, text=word, triad=triad)
     # A clock may be local, too, so that this is a unit of nothing else.
     local = re.search(r"\blocal\b", f"{column.source} {raw.units.get(column.source)}")
     if unit in RELATIVE_FIELDS or (triad == "mag" and unit is None and local):
@@ -428,7 +461,7 @@ def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]
     for triad, unit in units.items():
         other = said.get(f"{triad}_unit")
         form = said.get(f"{triad}_form")
-        if triad in asked or other is None:
+        if triad in asked or other is None or not _usual(log, triad):
             continue
         code, why = "io.contradicts-unit", other
         data: dict[str, Any] = {"file": log.raw.name, "quantity": triad, "triad": triad}
@@ -507,7 +540,7 @@ def _ask_beyond_full_scale(log: LogInUse, units: dict[str, str], asked: set[str]
     """
     gyro, rate = log.values["gyro"], log.said.get("rate")
     other, unit = log.said.get("gyro_unit"), units.get("gyro", "")
-    if "gyro" in asked or unit not in GYRO_UNITS or other is None or other.settled:
+    if "gyro" in asked or unit not in INFERRED["gyro"] or other is None or other.settled:
         return
     if _instead(unit, other):  # asked already
         return

@@ -261,8 +261,8 @@ OTHER_QUANTITY = ABOUT | {
 #: Units that say the sensor of a column whose name is an axis. Those of a field in gauss are also
 #: written for accelerations in g.
 BY_UNIT = {
-    "gyro": set(GYRO_UNITS),
-    "accel": {"m/s2", "g", "mg", "ft/s2"},
+    "gyro": {*GYRO_UNITS} - {"rpm", "rev/s"},  # as well of an engine, and a frequency
+    "accel": {"m/s2", "g", "mg", "ft/s2", "cm/s2", "mm/s2"},
     "mag": {"uT", "nT"},
 }
 

@@ -240,3 +240,90 @@ def test_a_form_that_cannot_be_read(run_cli, drive):
     for flag, text in (("--gnss-origin", "1,2"), ("--gnss-columns", "lat"), ("--gnss-units", "x=")):
         done = run_cli(*base, flag, text)
         assert done.code == 4 and flag in done.err
+
+
+# Courses, and coordinates, whose unit or sense the file does not state.
+
+_T = np.arange(300) * 0.5
+_TURN = 0.4 + 0.9 * np.sin(_T / 11) + _T / 24
+_SPEED = 12.0 + 5.0 * np.sin(_T / 7)
+
+
+def wound(tmp_path, **columns):
+    """A winding drive without noise, with further columns."""
+    v = np.column_stack([_SPEED * np.cos(_TURN), _SPEED * np.sin(_TURN), 0 * _T])
+    way = np.vstack([np.zeros(3), np.cumsum(0.25 * (v[1:] + v[:-1]), axis=0)])
+    lat, lon, alt = geodetic_from_ned(way, (48.1, 11.5, 500.0)).T
+    path = tmp_path / "fixes.csv"
+    return written(path, {"time": _T, "lat": lat, "lon": lon, "alt": alt, **columns}), v
+
+
+def read_course(path, **units):
+    return sd.read_gnss(path, units=units, position_sd_m=1.0, velocity_sd_m_per_s=0.1)
+
+
+DEGREES = np.degrees(_TURN) % 360.0
+
+
+@pytest.mark.parametrize(
+    ("course", "factor", "units"),
+    [
+        (DEGREES, 1.0, {}),
+        ((DEGREES + 180.0) % 360.0 - 180.0, 1.0, {}),
+        (np.radians(DEGREES), 1.0, {"course": "rad"}),
+        (np.radians((DEGREES + 180.0) % 360.0 - 180.0), 1.0, {"course": "rad"}),
+        (np.round(100 * DEGREES), 1.0, {"course": "cdeg"}),
+        (np.round(1e5 * DEGREES), 1.0, {"course": "1e-5 deg"}),
+        (360.0 - DEGREES, 1.0, {"course": "-deg"}),
+        ((DEGREES + 180.0) % 360.0, 1.0, {"speed": "-m/s"}),
+        (np.radians(DEGREES), 3.6, {"speed": "km/h", "course": "rad"}),
+    ],
+)
+def test_a_course_without_a_unit_is_held_against_the_positions(tmp_path, course, factor, units):
+    path, v = wound(tmp_path, speed=factor * _SPEED, course=course)
+    if units:
+        with pytest.raises(DataError) as refused:
+            read_course(path)
+        assert refused.value.finding.data["python"] == str(units).replace("'", '"')
+    fixes = read_course(path, **units)
+    # The course is rounded to 0.01 deg: 1.5 mm/s of 17 m/s.
+    np.testing.assert_allclose(fixes[["VN", "VE"]], v[:, :2], atol=2e-3)
+
+
+def test_a_course_from_east_is_told(tmp_path):
+    path, _ = wound(tmp_path, speed=_SPEED, course=(90.0 - DEGREES) % 360.0)
+    with pytest.raises(DataError, check=coded("io.course-from-east")):
+        read_course(path)
+
+
+def test_a_course_beyond_a_turn_is_asked_about_where_nothing_moves(tmp_path):
+    path = written(tmp_path / "a.csv", geodetic(speed=0.1 + 0 * _T, course=9000.0 + 10 * _T))
+    with pytest.raises(DataError, check=coded("io.course-beyond-turn")):
+        read_course(path)
+
+
+def test_a_velocity_up_is_stated_with_a_minus(tmp_path):
+    north, east = _SPEED * np.cos(_TURN), _SPEED * np.sin(_TURN)
+    path, _ = wound(tmp_path, VN=north, VE=east, VD=0 * _T + 1.0)
+    np.testing.assert_array_equal(read_course(path, VD="-m/s")["VD"], -1.0)
+
+
+def test_velocities_of_nothing_are_warned_of(tmp_path):
+    path, _ = wound(tmp_path, VN=_SPEED, VE=0.0 * _T, VD=0.0 * _T)
+    codes = [f.code for f in read_course(path).findings]
+    assert "io.velocity-unlike-positions" in codes
+
+
+def test_coordinates_that_may_be_radians_are_asked_about(tmp_path):
+    """Degrees and radians are both on the Earth; the unit in a name answers it."""
+    path, _ = wound(tmp_path)
+    table = pd.read_csv(path)
+    radians = table.assign(lat=np.radians(table.lat), lon=np.radians(table.lon))
+    radians.to_csv(path, index=False)
+    with pytest.raises(DataError, check=coded("io.degrees-or-radians")):
+        read_course(path)
+    fixes = read_course(path, lat="rad", lon="rad")
+    np.testing.assert_allclose(fixes[["lat", "lon"]], table[["lat", "lon"]], atol=1e-9)
+    assert read_course(path, lat="deg", lon="deg")["lat"].max() < 1.0
+    radians.rename(columns={"lat": "lat_rad", "lon": "lon_rad"}).to_csv(path, index=False)
+    np.testing.assert_allclose(read_course(path)[["lat", "lon"]], table[["lat", "lon"]], atol=1e-9)

@@ -21,7 +21,7 @@ from strapdown.formats.inference.conclusion import (
     marginal,
     posterior,
 )
-from strapdown.units import GYRO_UNITS, TIME_UNITS
+from strapdown.units import GYRO_UNITS, INFERRED, TIME_UNITS
 
 Array = NDArray[np.float64]
 
@@ -115,7 +115,8 @@ def infer_gyro(
     scales: list[tuple[Turn, float]] = []
     likely = {u: p for u, p in time_units.items() if p > 1e-3} or {"s": 1.0}
     written = _written_step(gyro)
-    steps = {unit: _in_steps(gyro, scale, written) for unit, scale in GYRO_UNITS.items()}
+    usual = {unit: GYRO_UNITS[unit] for unit in INFERRED["gyro"]}
+    steps = {unit: _in_steps(gyro, scale, written) for unit, scale in usual.items()}
     base: dict[tuple[str | None, str, str], float] = {}
     by_scale: dict[float, dict[Hypothesis, float]] = {}
     stood: list[Finding] = []
@@ -126,7 +127,7 @@ def infer_gyro(
         for k, count in enumerate(_COUNTS):
             prior = _PRIOR_COUNTS / len(_COUNTS) * (1.0 if whole else _BROKEN_COUNTS)
             candidates[None, f"counts {k}"] = (np.radians(count), prior)
-        for unit, scale in GYRO_UNITS.items():
+        for unit, scale in usual.items():
             prior = milli * _PRIOR_MILLI[unit] + (1.0 - milli) * _PRIOR[unit]
             prior *= _WHOLE[unit] if whole else 1.0
             prior *= 1.0 + steps[unit][1]
