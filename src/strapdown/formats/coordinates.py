@@ -19,6 +19,7 @@ from strapdown.errors import DataError
 from strapdown.formats.arrays import numbers
 from strapdown.formats.find_columns import Found
 from strapdown.formats.recording import RawLog
+from strapdown.tables.checks import POSITION_SD, VELOCITY_SD
 
 Array = NDArray[np.float64]
 
@@ -66,6 +67,7 @@ def with_degrees(raw: RawLog, found: Mapping[str, Found]) -> RawLog:
         if form == "1e-7 deg" and not found["lat"].source.lower().endswith("e7"):
             _refuse_open_scale(raw, scaled)
             changed |= _heights_in_mm(raw, found)
+            _refuse_accuracies_open(raw, found)
         if form:
             raw.note(
                 "io.coordinates-in-one-number",
@@ -213,6 +215,36 @@ def _heights_in_mm(raw: RawLog, found: Mapping[str, Found]) -> dict[str, Array]:
             raise height_unit_open(raw, "io.height-unit-open", quantity, one, float(known[0]))
         out[one.source] = heights * 1e-3
     return out
+
+
+#: Quantities that are whole numbers of mm, or mm/s, where coordinates are of 1e-7 deg.
+_ACCURACIES = ("horizontal_accuracy", "vertical_accuracy", *POSITION_SD)
+_ACCURACIES_OF_SPEED = ("speed_sd", *VELOCITY_SD)
+
+
+def _refuse_accuracies_open(raw: RawLog, found: Mapping[str, Found]) -> None:
+    """Ask for the unit of accuracies that are whole numbers, as the coordinates are."""
+    asked: dict[str, tuple[Found, float]] = {}
+    for quantity in (*_ACCURACIES, *_ACCURACIES_OF_SPEED):
+        one = found.get(quantity)
+        if one is None or one.stated:
+            continue
+        values = np.asarray(numbers(raw, one.source, quantity), dtype=np.float64)
+        known = values[np.isfinite(values)]
+        if known.size and (known % 1.0 == 0.0).all() and (known > 1.0).any():
+            asked[quantity] = one, float(known[0])
+    if asked:
+        units = {q: "mm" if q in _ACCURACIES else "mm/s" for q in asked}
+        column, first = next(iter(asked.values()))
+        raise raw.fault(
+            "io.accuracy-unit-open",
+            ", ".join(asked),
+            source=column.source,
+            first=first,
+            python="{" + ", ".join(f'"{q}": "{u}"' for q, u in units.items()) + "}",
+            flags="--gnss-units " + ",".join(f"{q}={u}" for q, u in units.items()),
+            keys="units = {" + ", ".join(f'{q} = "{u}"' for q, u in units.items()) + "}",
+        )
 
 
 def height_unit_open(

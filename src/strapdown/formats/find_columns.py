@@ -855,7 +855,11 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
     if not raw.stated:
         names = list(raw.columns)
         clocks = [n for n in names if read_name(n, FIXES).quantity == "time"]
-        if len(clocks) > 1:
+        if of_ublox := [n for n in clocks if plain_name(n) == "itow"]:
+            # Beside it are the parts of a date: year, month, day, hour, min, sec.
+            other = set(clocks) - {of_ublox[0], *asked.values()}
+            names = [n for n in names if n not in other]
+        elif len(clocks) > 1:
             # A lone T is as often a temperature; a text that is no stamp is no clock.
             other = {n for n in clocks if n == "T" or not is_clock(raw, n)} - set(asked.values())
             names = [n for n in names if n not in other or other >= set(clocks)]
@@ -868,6 +872,11 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
     }
     named = find_quantities(raw.columns, FIXES, asked, raw.name) if asked else {}
     return found | {quantity: named[quantity] for quantity in asked}
+
+
+def plain_name(name: str) -> str:
+    """Return the letters and digits of a name, or of what is behind its last point or slash."""
+    return re.sub(r"[\W_]", "", re.split(r"[./]", name)[-1].lower())
 
 
 def names_of_fixes(raw: RawLog) -> set[str]:

@@ -18,7 +18,7 @@ from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock
 from strapdown.formats.coordinates import height_unit_open, with_degrees
-from strapdown.formats.find_columns import Found, fix_columns, names_of_quantities
+from strapdown.formats.find_columns import Found, fix_columns, names_of_quantities, plain_name
 from strapdown.formats.gnss_fixes import (
     NOWHERE,
     RADIUS,
@@ -52,7 +52,8 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     north, east, up of an origin that the user states. DataError: time or the position is missing,
     two columns fit one quantity, or a unit is unknown.
     """
-    found = _in_units(raw, fix_columns(raw, options.columns), options.units)
+    found = _of_ublox(raw, fix_columns(raw, options.columns))
+    found = _in_units(raw, found, options.units)
     raw = _rows_of_fixes(with_degrees(raw, found), found)
     _refuse_missing(raw, found, stated=options.datum_height is not None)
 
@@ -99,6 +100,52 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         height_source=found[datum].source if datum in found else "",
         findings=raw.findings,
     )
+
+
+#: Units of whole numbers in UBX-NAV-PVT of u-blox (Interface Description, NAV-PVT), by name.
+_NAV_PVT = {
+    **dict.fromkeys(("height", "hmsl", "hacc", "vacc"), "mm"),
+    **dict.fromkeys(("veln", "vele", "veld", "gspeed", "sacc"), "mm/s"),
+    "headmot": "1e-5 deg",
+}
+#: Fields that no other table has under these names; and the fewest of all that say it.
+_OF_NAV_PVT, _LEAST_FIELDS = {"itow", "gspeed", "headmot", "headacc", "fixtype", "hmsl"}, 3
+
+
+def _of_ublox(raw: RawLog, found: dict[str, Found]) -> dict[str, Found]:
+    """Give the columns of a table of UBX-NAV-PVT, in whole numbers, their units, and report it.
+
+    Programs scale some of them and leave others: a course that is none of whole numbers is in deg,
+    and all others are whole, or none is taken so.
+    """
+    names = {plain_name(name) for name in raw.columns}
+    if raw.stated or not names & _OF_NAV_PVT or len(names & _NAV_PVT.keys()) < _LEAST_FIELDS:
+        return found
+    out, units, whole = dict(found), {}, []
+    for quantity, one in found.items():
+        unit = "ms" if quantity == "time" else _NAV_PVT.get(plain_name(one.source))
+        if unit is None or one.stated or raw.columns[one.source].dtype.kind not in "iuf":
+            continue
+        if unit == "mm/s" and "cacc" in names:  # of UBX-NAV-VELNED, which has no other unit
+            unit = "cm/s"
+        values = np.asarray(numbers(raw, one.source, quantity), dtype=np.float64)
+        known = values[np.isfinite(values)]
+        are_whole = bool((known % 1.0 == 0.0).all())
+        if quantity == "time":  # seconds of a week do not go so far
+            if are_whole and known.size and WEEK < known.max() < 1e3 * WEEK:
+                out[quantity] = Found(one.source, one.factor * 1e-3, True)
+                units[one.source] = unit
+            continue
+        if quantity != "course":
+            whole.append(are_whole)
+        if are_whole:
+            factor = FIXES.quantities[quantity].units[unit]
+            out[quantity] = Found(one.source, one.factor * factor, True)
+            units[one.source] = unit
+    if not units or not all(whole):
+        return found
+    raw.note("io.units-of-ublox", units=[f"{name} {unit}" for name, unit in units.items()])
+    return out
 
 
 def _in_units(raw: RawLog, found: dict[str, Found], units: Mapping[str, str]) -> dict[str, Found]:

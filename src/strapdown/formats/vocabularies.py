@@ -432,7 +432,9 @@ FIXES = Vocabulary(
             ),
             LENGTHS,
         ),
-        "speed": Quantity(_words("speed sog groundspeed locationspeed speedoverground"), SPEEDS),
+        "speed": Quantity(
+            _words("speed sog gspeed groundspeed locationspeed speedoverground"), SPEEDS
+        ),
         "speed_sd": Quantity(_words("speedaccuracy speedsd sacc locationspeedaccuracy"), SPEEDS),
         "course": Quantity(
             _words(
