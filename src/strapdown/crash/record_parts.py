@@ -764,7 +764,7 @@ def gyro_unit(time: Array, values: Array, quiet: Quiet) -> Answer:
     crash = slice(
         max(quiet.samples - 1, 0) if quiet.samples < len(values) - LEAST_QUIET else 0, None
     )
-    said, _, _, _ = infer_gyro(time[crash] - time[crash][0], values[crash], None, {"s": 1.0})
+    said, *_, _ = infer_gyro(time[crash] - time[crash][0], values[crash], None, {"s": 1.0})
     prior = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
     peak = float(np.abs(values - quiet.mean).max())
     offset = float(np.abs(quiet.mean).max())

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.arrays import as_rows, numbers
 from strapdown.formats.columns import parse_axes, read_name
@@ -176,7 +177,98 @@ def units_of_triads(log: LogInUse) -> dict[str, tuple[str, str]]:
     plain = {t: u for t, (u, _) in units.items()}
     _report_contradictions(log, plain, asked)
     _ask_beyond_full_scale(log, plain, asked)
+    if not any(q.quantity == "gyro" for q in log.questions.questions):
+        _report_scale_of_gyro(log, plain["gyro"])
+    if "accel" in plain and not any(q.quantity == "accel" for q in log.questions.questions):
+        _report_scale_of_force(log, plain["accel"])
     return units
+
+
+#: A gyro beyond these of what gravity shows, and a steady force beyond these of gravity, are of
+#: another scale: 3 % and 80 mg are those of consumer sensors (MPU-6050 data sheet, section 6.2); an
+#: arm in step with its rotation adds to the first.
+GYRO_SCALES, FORCE_SCALES = (0.8, 1.25), (0.88, 1.12)
+#: Causes of a scale, by what the right values are relative to those read: powers of two are
+#: sensitivities of other full scales, in deg/s or in g.
+_RANGES = tuple(2.0**k for k in (-5, -4, -3, -2, -1, 1, 2, 3, 4, 5))
+
+
+def _cause(low: float, high: float) -> Finding:
+    """Return what may have made a factor between two bounds, as a note."""
+    for factor in (np.degrees(1.0), np.radians(1.0)):
+        if low < factor < high:
+            return Finding("io.cause-degrees", severity="note", factor=float(factor))
+    factor = next((f for f in _RANGES if low < f < high), None)
+    code = "io.cause-unknown" if factor is None else "io.cause-range"
+    return Finding(code, severity="note", factor=factor)
+
+
+def _report_scale_of_gyro(log: LogInUse, unit: str) -> None:
+    """Warn of a gyro that explains the turning of gravity at another scale alone."""
+    scale = log.said.get("gyro_scale")
+    if scale is None or scale.value is None or unit in SUMS["gyro"]:
+        return
+    # In SI already, where the unit is one that none infers.
+    of_unit = factor_of(unit, GYRO_UNITS) if _usual(log, "gyro") else 1.0
+    said = scale.evidence[0].data
+    factor, low, high = (float(said[k]) / of_unit for k in ("scale", "low", "high"))
+    if low > GYRO_SCALES[1] or high < GYRO_SCALES[0]:
+        log.warn(
+            "io.gyro-scale",
+            "gyro",
+            factor=factor,
+            low=low,
+            high=high,
+            percent=said["percent"],
+            unit=unit,
+            cause=_cause(low, high),
+        )
+
+
+#: Length of a piece that may be steady, s, the largest spread of its norm, the fewest of them, also
+#: as a share of all, and the spread of the middle half of their norms.
+_PIECE, _QUIET, _FEWEST, _OF_ALL, _ALIKE = 0.5, 0.02, 10, 0.1, 0.05
+#: Sizes of a steady force, relative to gravity, that are those of another scale; less is of none.
+_OTHER_SCALES = (0.2, 40.0)
+
+
+def _report_scale_of_force(log: LogInUse, unit: str) -> None:
+    """Warn of an accelerometer whose force, where its size is steady, is not gravity."""
+    rate, gravity = log.said.get("rate"), log.said.get("gravity")
+    removed = gravity is not None and gravity.value == "removed"
+    if rate is None or rate.value is None or removed or unit in SUMS["accel"]:
+        return
+    values = log.values["accel"]
+    size = max(round(_PIECE * float(rate.value)), 5)
+    count = len(values) // size
+    some = 1 + count // 2000
+    pieces = values[: count * size].reshape(count, size, 3)[::some]
+    if len(pieces) < _FEWEST:
+        return
+    norms = np.linalg.norm(pieces, axis=2)
+    norm = norms.mean(axis=1)
+    quiet = np.isfinite(norm) & (norms.std(axis=1) < _QUIET * norm)
+    if quiet.sum() < max(_FEWEST, _OF_ALL * len(pieces)):
+        return
+    low, middle, high = map(float, np.quantile(norm[quiet], (0.25, 0.5, 0.75)))
+    if high - low > _ALIKE * middle:
+        return
+    usual = middle * abs(factor_of(unit, ACCEL_UNITS))
+    of_gravity = usual / STANDARD_GRAVITY
+    if FORCE_SCALES[0] < of_gravity < FORCE_SCALES[1] or not (
+        _OTHER_SCALES[0] < of_gravity < _OTHER_SCALES[1]
+    ):
+        return
+    low, high = FORCE_SCALES[0] / of_gravity, FORCE_SCALES[1] / of_gravity
+    log.warn(
+        "io.force-scale",
+        "accel",
+        size=usual,
+        seconds=float(quiet.sum()) * some * _PIECE,
+        unit=unit,
+        factor=1.0 / of_gravity,
+        cause=_cause(low, high),
+    )
 
 
 def _without_gravity(log: LogInUse) -> bool:
@@ -466,7 +558,11 @@ def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]
         code, why = "io.contradicts-unit", other
         data: dict[str, Any] = {"file": log.raw.name, "quantity": triad, "triad": triad}
         data["unit"] = unit
-        if triad == "gyro" and not other.settled and (instead := _instead(unit, other)):
+        if (
+            triad == "gyro"
+            and not other.settled
+            and (instead := _instead(unit, other, said.get("gyro_scale")))
+        ):
             fault = Finding("io.contradicts-unit", **data, likely=instead, reason=other.finding())
             log.questions.ask(fault, gyro_unit=instead)
         if not other.settled:
@@ -513,7 +609,7 @@ def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]
     )
 
 
-def _instead(unit: str, inferred: Inference) -> str | None:
+def _instead(unit: str, inferred: Inference, scale: Inference | None = None) -> str | None:
     """Return the most probable unit of a gyro if gravity that stood still excludes the stated one.
 
     The numbers need not settle which of the others it is.
@@ -525,7 +621,12 @@ def _instead(unit: str, inferred: Inference) -> str | None:
         return None
     shares = dict(((inferred.value, inferred.confidence), *inferred.alternatives))
     others = [str(u) for u in shares if u not in (unit, None)]
-    return others[0] if others and shares.get(unit, 0.0) < 1.0 - THRESHOLD else None
+    if not others or shares.get(unit, 0.0) >= 1.0 - THRESHOLD:
+        return None
+    # None of them, where gravity that turned shows a factor that none has.
+    said = scale.evidence[0].data if scale is not None and scale.value is not None else None
+    fits = said is None or said["low"] < GYRO_UNITS[others[0]] < said["high"]
+    return others[0] if fits else "UNIT"
 
 
 # Full scale of most gyros, 2000 deg/s per axis, and seconds beyond it. Bodies that turn so fast are

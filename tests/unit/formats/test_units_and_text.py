@@ -11,6 +11,7 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_log
 from strapdown.formats.columns import read_name
 from strapdown.formats.recording import ReadOptions
+from strapdown.formats.triad_units import _cause
 from strapdown.tables import ACCEL, GYRO
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, factor_of, parse_unit, unit_of
 
@@ -262,3 +263,55 @@ def test_a_word_that_is_no_unit_of_the_sensor_is_asked_about(tmp_path, rate_unit
 def test_words_that_say_no_unit_are_no_question(tmp_path, word):
     path, w, _ = tumbling(tmp_path, word, "m/s²", 1.0, 1.0, "{} ({})")
     np.testing.assert_allclose(read_log(path).imu[GYRO], w, atol=1e-9)
+
+
+# Scales that the numbers show beside a stated unit.
+
+
+@pytest.mark.parametrize(
+    ("off", "cause"),
+    [
+        (1.0, None),
+        (0.9, None),
+        (0.5, "io.cause-range"),
+        (2.0, "io.cause-range"),
+        (4.0, "io.cause-range"),
+        (1.5, "io.cause-unknown"),
+    ],
+)
+def test_a_gyro_at_another_scale_than_gravity_shows(tmp_path, off, cause):
+    """Numbers that are `off` times those of the stated unit."""
+    path, w, _ = tumbling(tmp_path, "deg/s", "m/s²", np.radians(1.0) / off, 1.0, "{} ({})")
+    read = read_log(path)
+    np.testing.assert_allclose(read.imu[GYRO], off * w, atol=1e-6)
+    said = [f for f in read.findings if f.code == "io.gyro-scale"]
+    assert len(said) == (cause is not None)
+    for one in said:
+        assert one.data["low"] < 1.0 / off < one.data["high"]
+        assert one.data["factor"] * off == pytest.approx(1.0, abs=0.02)
+        assert one.data["cause"].code == cause
+
+
+@pytest.mark.parametrize(
+    ("off", "cause"), [(1.0, None), (0.9, None), (1.1, None), (0.5, "range"), (1.25, "unknown")]
+)
+@pytest.mark.parametrize("turns", [True, False])
+def test_a_steady_force_that_is_not_gravity(tmp_path, off, cause, turns):
+    path, _, _ = tumbling(tmp_path, "rad/s", "m/s²", 1.0, 1.0 / off, "{} ({})")
+    if not turns:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        rows = [line.split(",", 1)[0] + ",0.01,0,0,0,0.1," + repr(off * 9.8) for line in lines[1:]]
+        path.write_text("\n".join([lines[0], *rows]), encoding="utf-8")
+    said = [f for f in read_log(path).findings if f.code == "io.force-scale"]
+    assert [one.data["cause"].code for one in said] == ([f"io.cause-{cause}"] if cause else [])
+    for one in said:
+        assert one.data["factor"] == pytest.approx(1.0 / off, rel=1e-3)
+
+
+def test_no_unit_is_proposed_that_the_turning_of_gravity_excludes(tmp_path):
+    """Converted to degrees twice: no unit has that factor."""
+    path, _, _ = tumbling(tmp_path, "deg/s", "m/s²", np.radians(np.radians(1.0)), 1.0, "{} ({})")
+    with pytest.raises(DataError, check=coded("io.contradicts-unit")) as refused:
+        read_log(path)
+    assert dict(refused.value.finding.data["answers"]) == {"gyro_unit": "UNIT"}
+    assert _cause(57.0, 58.0).code == _cause(0.017, 0.018).code == "io.cause-degrees"
