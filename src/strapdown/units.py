@@ -218,10 +218,12 @@ OF_CRASHES = ("acceleration", "rate", "force", "velocity", "displacement", "time
 # Spellings without blanks and in lower case, by unit. A division in a name of a column is an
 # underscore, with or without "per": `_forms` adds these.
 _SPELLINGS = {
-    "rad/s": "rad/s rads radps rad/sec rads/s rads/sec radian/s radians/s radians/sec rad·s-1 "
+    "rad/s": "rad/s рад/с рад/сек rads radps "
+    "rad/sec rads/s rads/sec radian/s radians/s radians/sec rad·s-1 "
     "rad*s^-1 rad.s-1 radsec 1/s*rad",
     "mrad/s": "mrad/s",
-    "deg/s": "deg/s deg/sec degs degps dps °/s °/sec º/s º/sec degree/s degree/sec degrees/s "
+    "deg/s": "deg/s град/с град/сек °/с °/сек "
+    "deg/sec degs degps dps °/s °/sec º/s º/sec degree/s degree/sec degrees/s "
     "degrees/sec deg/second degsec grad/s",
     "mdeg/s": "mdeg/s mdps",
     "deg/h": "deg/h deg/hr °/h °/hr º/h dph deg/hour degrees/hour",
@@ -235,7 +237,8 @@ _SPELLINGS = {
     "arcsec/s": "arcsec/s asec/s",
     "arcmin/s": "arcmin/s amin/s",
     "gon/s": "gon/s gons/s",
-    "m/s2": "n/kg m/s2 m/s^2 m/s² m/s**2 m/s/s m/sec2 m/sec^2 m/(s*s) m/s*s m/ss mss ms2 ms^2 ms-2 "
+    "m/s2": "n/kg м/с2 м/с² м/с^2 м/сек2 "
+    "m/s2 m/s^2 m/s² m/s**2 m/s/s m/sec2 m/sec^2 m/(s*s) m/s*s m/ss mss ms2 ms^2 ms-2 "
     "mps2 m_per_s_2 m·s-2 m*s^-2 meters/sec/sec meters/s2 meters/s^2",
     "ft/s2": "ft/s2 ft/s^2 ft/s² ft/s**2 ft/sec2 ft/sec^2 ft/s/s fps2 feet/s2",
     "cm/s2": "cm/s2 cm/s^2 cm/s² cm/s**2 cm/sec2 cm/sec^2 cm/sec² cm/s/s gal gals",
@@ -254,7 +257,7 @@ _SPELLINGS = {
     "cm/s": "cm/s",
     "mm/s": "mm/s",
     "kn": "kn kt kts knot knots",
-    "uT": "ut µt μt microtesla",
+    "uT": "ut мктл µt μt microtesla",
     "nT": "nt nanotesla",
     "gauss": "gauss ga",
     "mG": "mgauss milligauss mga",

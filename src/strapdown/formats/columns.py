@@ -27,6 +27,7 @@ from strapdown.formats.vocabularies import (
     NOISE,
     OF_TIME,
     OTHER_QUANTITY,
+    PARTS,
     PLACES,
     PX4,
     QUANTITIES,
@@ -353,6 +354,11 @@ def _without_chip(text: str) -> tuple[str, str]:
 def _words_of(text: str) -> list[str]:
     """Return the words of a name, in lower case and in English where they are known."""
     return [e for w in _HUMPS.findall(_SCRIPTS.sub(" ", text)) for e in _english(w.lower())]
+
+
+def parts_in(name: str) -> frozenset[str]:
+    """Return the words of a name that say on which part of a body a sensor is."""
+    return frozenset(_words_of(split_brackets(name)[0])) & PARTS
 
 
 def _english(word: str) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from strapdown.formats.columns import (
     UNKNOWN_WORDS,
     ColumnName,
     clocks_with_unit,
+    parts_in,
     read_name,
     split_brackets,
 )
@@ -113,10 +114,36 @@ def find_columns(
     for q, name in wanted.items():
         stated = found[q].unit if q in found and found[q].source == name else None
         basis: Basis = "open" if q in inferred else "option"
-        found[q] = Column(name, _unit_of(raw, name) or stated, basis)
+        found[q] = Column(name, unit_stated(raw, name) or stated, basis)
+    if not (raw.stated or wanted.keys() & {"gyro_x", "accel_x"}):
+        _ask_parts(raw, found, asked_here)
     if questions is None:
         asked_here.refuse()
     return found
+
+
+def _ask_parts(raw: RawLog, found: Mapping[str, Column], questions: Questions) -> None:
+    """Ask whether a gyro and an accelerometer of different parts of a body belong together."""
+    if not {"gyro_x", "accel_x"} <= found.keys():
+        return
+    gyro, accel = (parts_in(found[f"{triad}_x"].source) for triad in ("gyro", "accel"))
+    if gyro and accel and not gyro & accel:
+        names = [found[f"{t}_{a}"].source for t in ("gyro", "accel") for a in AXES]
+        columns = {
+            f"{t}_{a}": reference(raw, found[f"{t}_{a}"].source)
+            for t in ("gyro", "accel")
+            for a in AXES
+            if f"{t}_{a}" in found
+        }
+        fault = Finding(
+            "io.sensors-of-different-parts",
+            file=raw.name,
+            quantity="accel",
+            gyro=" ".join(sorted(gyro)),
+            accel=" ".join(sorted(accel)),
+            names=names,
+        )
+        questions.ask(fault, **columns)
 
 
 def names_of_quantities(raw: RawLog) -> set[str]:
@@ -394,10 +421,19 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
     families = _families(raw, said)
     if ("gyro", "g") in families:
         _letter_g(raw, families, wanted, questions, found)
-    for triad in TRIADS:
-        kept = _best({f: m for (t, f), m in families.items() if t == triad}, said)
+    of_triads = {t: _best({f: m for (k, f), m in families.items() if k == t}, said) for t in TRIADS}
+    shared = frozenset.intersection(
+        *(
+            frozenset().union(*(parts_in(next(iter(m.values()))) for m in of_triads[t].values()))
+            for t in ("gyro", "accel")
+        )
+    )
+    for triad, kept in of_triads.items():
         if not kept:
             continue
+        # Of several parts of a body, those that have a gyro and an accelerometer.
+        paired = {f: m for f, m in kept.items() if parts_in(next(iter(m.values()))) & shared}
+        kept = paired or kept
         # In a file of several units, those of the unit whose columns are asked for.
         inside = {n.rpartition("/")[0] for q, n in wanted.items() if q[:-2] in TRIADS} - {""}
         of_unit = {
@@ -448,7 +484,7 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
             questions.ask(
                 _several(raw, quantity, names, names[0]), **{quantity: reference(raw, names[0])}
             )
-    return {q: Column(name, _unit_of(raw, name), "name") for q, name in found.items()}
+    return {q: Column(name, unit_stated(raw, name), "name") for q, name in found.items()}
 
 
 def _families(raw: RawLog, said: dict[str, ColumnName]) -> dict[tuple[str, str], Family]:
@@ -512,7 +548,7 @@ def _letter_g(
     there.
     """
     own = families["gyro", "g"]
-    units = {_unit_of(raw, name) for name in own.values()}
+    units = {unit_stated(raw, name) for name in own.values()}
     if units <= set(GYRO_UNITS) or set(own.values()) & set(wanted.values()):
         return
     linear = [n for (t, _), m in families.items() if t == "accel" for n in m.values()]
@@ -577,7 +613,7 @@ def _one_clock(raw: RawLog, names: list[str]) -> list[str]:
     names = [n for n in names if is_clock(raw, n)] or names
     # A stamp that a spreadsheet rounded is the same in every row.
     names = [n for n in names if len(set(raw.columns[n][:2].tolist())) > 1] or names
-    names = clocks_with_unit(names, lambda n: _unit_of(raw, n) is not None)
+    names = clocks_with_unit(names, lambda n: unit_stated(raw, n) is not None)
     if len(names) > 1 and all(raw.columns[n].dtype.kind in "iuf" for n in names):
         steps = [np.diff(raw.columns[n].astype(np.float64)) for n in names]
         scaled = [s / s.mean() if s.size and s.mean() > 0.0 else None for s in steps]
@@ -599,7 +635,8 @@ def is_clock(raw: RawLog, name: str) -> bool:
     return values.dtype.kind != "O" or bool(values.size and is_stamp(str(values[0])))
 
 
-def _unit_of(raw: RawLog, column: str) -> str | None:
+def unit_stated(raw: RawLog, column: str) -> str | None:
+    """Return the unit of a column of a sensor, as a row of units, its name or ROS states it."""
     if column in raw.units:
         return unit_of(raw.units[column])
     return read_name(column).unit or _ros_unit(raw, column)

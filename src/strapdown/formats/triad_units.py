@@ -293,6 +293,10 @@ def _refuse_open(log: LogInUse, triad: str) -> None:
     """
     raw, column = log.raw, log.found[f"{triad}_x"]
     unit = column.unit
+    # A clock may be local, too, so that this is a unit of nothing else.
+    local = re.search(r"\blocal\b", f"{column.source} {raw.units.get(column.source)}")
+    if unit in RELATIVE_FIELDS or (triad == "mag" and unit is None and local):
+        raise raw.fault("io.mag-unit-relative", triad, source=column.source)
     word = next((w for c in log.columns(triad) if (w := stated_word(raw, c.source, triad))), "")
     if word.lower() in COUNTS:
         raise DataError(
@@ -302,10 +306,6 @@ def _refuse_open(log: LogInUse, triad: str) -> None:
         )
     if word:
         raise raw.fault("io.unit-unknown-word", triad, source=column.source, text=word, triad=triad)
-    # A clock may be local, too, so that this is a unit of nothing else.
-    local = re.search(r"\blocal\b", f"{column.source} {raw.units.get(column.source)}")
-    if unit in RELATIVE_FIELDS or (triad == "mag" and unit is None and local):
-        raise raw.fault("io.mag-unit-relative", triad, source=column.source)
     apple = any(re.sub(r"\W", "", name).lower() in APPLE for name in raw.columns)
     if triad == "accel" and unit is None and apple:
         unit = "-g or g"  # that of CoreMotion, or turned by the application
