@@ -18,12 +18,14 @@ __all__ = [
     "ACCEL_SUMS",
     "ACCEL_UNITS",
     "ANGLES",
+    "COUNTS",
     "DATE_ORDERS",
     "ENDINGS",
     "FACTORS",
     "FORCES",
     "GYRO_SUMS",
     "GYRO_UNITS",
+    "INFERRED",
     "LENGTHS",
     "MAG_UNITS",
     "MASSES",
@@ -55,6 +57,16 @@ GYRO_UNITS: dict[str, float] = {
     "deg/s": _DEGREE,
     "mdeg/s": 1e-3 * _DEGREE,
     "deg/h": _DEGREE / 3600.0,
+    "rpm": 2.0 * math.pi / 60.0,
+    "rev/s": 2.0 * math.pi,
+    "deg/min": _DEGREE / 60.0,
+    "rad/min": 1.0 / 60.0,
+    "rad/h": 1.0 / 3600.0,
+    "urad/s": 1e-6,
+    "cdeg/s": 1e-2 * _DEGREE,
+    "arcsec/s": _DEGREE / 3600.0,
+    "arcmin/s": _DEGREE / 60.0,
+    "gon/s": math.pi / 200.0,
 }
 
 #: Factors to m/s².
@@ -63,6 +75,12 @@ ACCEL_UNITS: dict[str, float] = {
     "g": STANDARD_GRAVITY,
     "mg": 1e-3 * STANDARD_GRAVITY,
     "ft/s2": 0.3048,
+    "cm/s2": 1e-2,
+    "mm/s2": 1e-3,
+    "mGal": 1e-5,
+    "in/s2": 0.0254,
+    "km/h/s": 1.0 / 3.6,
+    "ug": 1e-6 * STANDARD_GRAVITY,
     # Sensors that report gravity instead of specific force, as iOS does.
     "-m/s2": -1.0,
     "-g": -STANDARD_GRAVITY,
@@ -73,7 +91,25 @@ GYRO_SUMS: dict[str, float] = {"rad": 1.0, "deg": _DEGREE}
 ACCEL_SUMS: dict[str, float] = {"m/s": 1.0, "g*s": STANDARD_GRAVITY}
 
 #: Factors to µT.
-MAG_UNITS: dict[str, float] = {"uT": 1.0, "nT": 1e-3, "gauss": 100.0, "mG": 0.1, "T": 1e6}
+MAG_UNITS: dict[str, float] = {
+    "uT": 1.0,
+    "nT": 1e-3,
+    "gauss": 100.0,
+    "mG": 0.1,
+    "T": 1e6,
+    "mT": 1e3,
+}
+#: Units of sensors that the numbers alone may show; others count where a file states them.
+INFERRED = {
+    "gyro": ("rad/s", "mrad/s", "deg/s", "mdeg/s", "deg/h"),
+    "accel": ("m/s2", "g", "mg", "ft/s2", "-m/s2", "-g"),
+    "mag": ("uT", "nT", "gauss", "mG", "T"),
+}
+#: Words of raw counts, which a file states in place of a unit.
+COUNTS = {
+    *("lsb", "lsbs", "count", "counts", "cts", "digit", "digits", "dn", "adc", "raw", "int16"),
+    *("i16", "ticks"),
+}
 
 #: Of a magnetometer that is calibrated by the field where it was, whose strength is not stated.
 RELATIVE_FIELDS: dict[str, float] = {"local_flux": 1.0}
@@ -85,7 +121,14 @@ TIME_UNITS: dict[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "m
 DATE_ORDERS = ("d/m/y", "m/d/y")
 
 #: Factors to degrees, the unit of angles in tables.
-ANGLES: dict[str, float] = {"deg": 1.0, "rad": math.degrees(1.0)}
+ANGLES: dict[str, float] = {
+    "deg": 1.0,
+    "rad": math.degrees(1.0),
+    "cdeg": 1e-2,
+    "1e-5 deg": 1e-5,
+    "1e-6 deg": 1e-6,
+    "1e-7 deg": 1e-7,
+}
 
 # Mile, foot, inch and pound are those of the international agreement of 1959: 0.3048 m per foot,
 # 0.45359237 kg per pound. A nautical mile is 1852 m (International Hydrographic Bureau, 1929).
@@ -120,7 +163,17 @@ MOMENTS: dict[str, float] = {
     "lbf*in": 4.4482216152605 * 0.0254,
 }
 MASSES: dict[str, float] = {"kg": 1.0, "lb": 0.45359237, "t": 1e3}
-PRESSURES: dict[str, float] = {"Pa": 1.0, "hPa": 100.0, "kPa": 1000.0, "mbar": 100.0, "bar": 1e5}
+PRESSURES: dict[str, float] = {
+    "Pa": 1.0,
+    "hPa": 100.0,
+    "kPa": 1000.0,
+    "mbar": 100.0,
+    "bar": 1e5,
+    "atm": 101325.0,
+    "mmHg": 101325.0 / 760.0,
+    "inHg": 25.4 * 101325.0 / 760.0,
+    "psi": 4.4482216152605 / 0.0254**2,
+}
 
 
 @dataclass(frozen=True)
@@ -169,17 +222,36 @@ OF_CRASHES = ("acceleration", "rate", "force", "velocity", "displacement", "time
 # Spellings without blanks and in lower case, by unit. A division in a name of a column is an
 # underscore, with or without "per": `_forms` adds these.
 _SPELLINGS = {
-    "rad/s": "rad/s rads radps rad/sec rads/s rads/sec radian/s radians/s radians/sec rad·s-1 "
+    "rad/s": "rad/s рад/с рад/сек rads radps "
+    "rad/sec rads/s rads/sec radian/s radians/s radians/sec rad·s-1 "
     "rad*s^-1 rad.s-1 radsec 1/s*rad",
     "mrad/s": "mrad/s",
-    "deg/s": "deg/s deg/sec degs degps dps °/s °/sec º/s º/sec degree/s degree/sec degrees/s "
+    "deg/s": "deg/s град/с град/сек °/с °/сек "
+    "deg/sec degs degps dps °/s °/sec º/s º/sec degree/s degree/sec degrees/s "
     "degrees/sec deg/second degsec grad/s",
     "mdeg/s": "mdeg/s mdps",
-    "deg/h": "deg/h deg/hr °/h °/hr",
-    "m/s2": "m/s2 m/s^2 m/s² m/s**2 m/s/s m/sec2 m/sec^2 m/(s*s) m/s*s m/ss mss ms2 ms^2 ms-2 "
+    "deg/h": "deg/h deg/hr °/h °/hr º/h dph deg/hour degrees/hour",
+    "rpm": "rpm r/min rev/min revs/min tr/min u/min 1/min turns/min turn/min min^-1 min-1 об/мин",
+    "rev/s": "rev/s revs/s rps r/s tr/s u/s turn/s turns/s turns/sec rev/sec об/с",
+    "deg/min": "deg/min °/min º/min degrees/min degrees/minute",
+    "rad/min": "rad/min",
+    "rad/h": "rad/h rad/hr",
+    "urad/s": "urad/s µrad/s μrad/s",
+    "cdeg/s": "cdeg/s cdps 0.01deg/s 0.01°/s",
+    "arcsec/s": "arcsec/s asec/s",
+    "arcmin/s": "arcmin/s amin/s",
+    "gon/s": "gon/s gons/s",
+    "m/s2": "n/kg м/с2 м/с² м/с^2 м/сек2 "
+    "m/s2 m/s^2 m/s² m/s**2 m/s/s m/sec2 m/sec^2 m/(s*s) m/s*s m/ss mss ms2 ms^2 ms-2 "
     "mps2 m_per_s_2 m·s-2 m*s^-2 meters/sec/sec meters/s2 meters/s^2",
     "ft/s2": "ft/s2 ft/s^2 ft/s² ft/s**2 ft/sec2 ft/sec^2 ft/s/s fps2 feet/s2",
-    "g": "g g0 gs g's g`s g-force gn g_n",
+    "cm/s2": "cm/s2 cm/s^2 cm/s² cm/s**2 cm/sec2 cm/sec^2 cm/sec² cm/s/s gal gals",
+    "mm/s2": "mm/s2 mm/s^2 mm/s² mm/s**2 mm/sec2 mm/sec^2 mm/s/s",
+    "mGal": "mgal mgals milligal",
+    "in/s2": "in/s2 in/s^2 in/s² in/s/s inch/s2 inch/s²",
+    "km/h/s": "km/h/s kmh/s kph/s km/(h*s)",
+    "ug": "ug µg μg micro-g microg",
+    "g": "g g0 gs g's g`s g-force gn g_n gee gees earth-g standardgravity",
     "mg": "mg milli-g",
     "m/s": "m/s m/sec mps m·s-1 meter/s meters/s meters/second metres/s metres/second",
     "g*s": "g*s g·s g_s",
@@ -189,11 +261,12 @@ _SPELLINGS = {
     "cm/s": "cm/s",
     "mm/s": "mm/s",
     "kn": "kn kt kts knot knots",
-    "uT": "ut µt μt microtesla",
+    "uT": "ut мктл µt μt microtesla",
     "nT": "nt nanotesla",
     "gauss": "gauss ga",
     "mG": "mgauss milligauss mga",
     "T": "tesla",
+    "mT": "mt millitesla",
     "local_flux": "local_flux localflux local_flux*",
     "s": "s sec secs second seconds",
     "ms": "ms msec msecs millis millisecond milliseconds",
@@ -202,6 +275,10 @@ _SPELLINGS = {
     "min": "min minutes",
     "deg": "deg ° degree degrees",
     "rad": "rad radian radians",
+    "cdeg": "cdeg centideg centidegrees centidegree 0.01deg 1e-2deg deg*100 deg/100",
+    "1e-5 deg": "1e-5deg dege5 deg*1e-5 10^-5deg deg*1e5",
+    "1e-6 deg": "1e-6deg dege6 deg*1e-6 10^-6deg microdeg udeg µdeg μdeg deg*1e6",
+    "1e-7 deg": "1e-7deg dege7 deg*1e-7 10^-7deg deg*1e7",
     "m": "m meter metre meters metres",
     "km": "km",
     "cm": "cm",
@@ -216,11 +293,15 @@ _SPELLINGS = {
     "kN*m": "kn*m knm kn-m kn·m",
     "lbf*ft": "lbf*ft lbf-ft lbfft ft-lbf ft-lb ftlb lb-ft lbft",
     "lbf*in": "lbf*in lbf-in lbfin in-lbf in-lb inlb lb-in lbin",
-    "Pa": "pa",
-    "hPa": "hpa",
-    "kPa": "kpa",
-    "mbar": "mbar",
+    "Pa": "pa pascal",
+    "hPa": "hpa hectopascal",
+    "kPa": "kpa kilopascal",
+    "mbar": "mbar millibar mb",
     "bar": "bar",
+    "atm": "atm",
+    "mmHg": "mmhg torr",
+    "inHg": "inhg",
+    "psi": "psi",
 }
 # Powers of a second, with any separator of the factors: rad s^-1, m·s⁻².
 _POWERS = {
@@ -229,6 +310,8 @@ _POWERS = {
     "degs-1": "deg/s",
     "°s-1": "deg/s",
     "ms-2": "m/s2",
+    "cms-2": "cm/s2",
+    "mms-2": "mm/s2",
     "ms-1": "m/s",
 }
 # One factor in brackets behind a division or a power: m/(s^2), rad/(s), m/s^(2).
@@ -238,7 +321,8 @@ _RAISED = str.maketrans({"⁻": "-", "−": "-", "¹": "1", "²": "2"})
 
 def _forms(spelling: str) -> Iterable[str]:
     yield spelling
-    if "/" in spelling and spelling[0] != "1":
+    # r_min is rather a least r than revolutions per minute.
+    if "/" in spelling and not spelling.startswith(("1", "r/", "u/")):
         yield spelling.replace("/", "_")
         yield spelling.replace("/", "_per_")
 

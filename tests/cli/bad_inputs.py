@@ -398,7 +398,11 @@ CASES = [
     Case(
         "A unit that is none",
         lambda f: text(f / "log.csv", rows(), "time_s,gx,gy,gz"),
-        ("--gyro-unit", "rpm"),
+        ("--gyro-unit", "furlongs"),
+    ),
+    Case(
+        "A word that is no unit, in the heading",
+        turning("time_s,gx (foo/s),gy (foo/s),gz (foo/s),ax (g),ay (g),az (g)", 1.0),
     ),
     Case(
         "Degrees that were called radians",

@@ -8,9 +8,11 @@ from tests.coded import coded
 
 from strapdown import tables
 from strapdown.errors import DataError
+from strapdown.frames import geodetic_from_ned
 from strapdown.simulation import Origin, car
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.vehicles import Straight, Turn
+from strapdown.tables.gnss import check_velocity
 
 DRIVE = car(
     Origin(48.0, 11.0, 500.0),
@@ -82,7 +84,7 @@ def test_time_and_columns_are_checked():
     ("change", "remedy"),
     [
         ({"VN": 3.6, "VE": 3.6}, r"m/s\) contradicts the positions, which move at"),
-        ({"VN": 1.943844, "VE": 1.943844}, "knots"),
+        ({"VN": 1.943844, "VE": 1.943844}, "in kn: multiply by 0.514"),
     ],
 )
 def test_velocities_in_another_unit_are_told(change, remedy):
@@ -98,6 +100,75 @@ def test_exchanged_columns_are_told():
         DataError, check=lambda refused: refused.finding.code == "tables.places-swapped"
     ):
         made(FIXES.assign(lat=FIXES["lon"], lon=FIXES["lat"]))
+
+
+def drawn(seed, speed, white, lasting, hill=0.0, rows=300):
+    """A winding way with errors of the positions that last for a minute, and exact velocities."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(rows, dtype=float)
+    course = rng.uniform(0.0, 6.3) + 0.9 * np.sin(t / 11.0) + t / 24.0
+    ahead = speed * (1.0 + 0.5 * np.sin(t / 7.0))
+    v = np.column_stack(
+        [ahead * np.cos(course), ahead * np.sin(course), hill / 30 * np.cos(t / 30)]
+    )
+    way = np.vstack([np.zeros(3), np.cumsum(0.5 * (v[1:] + v[:-1]), axis=0)])
+    errors, keep = rng.normal(size=(rows, 3)), np.exp(-1.0 / 60.0)
+    for k in range(1, rows):
+        errors[k] = keep * errors[k - 1] + np.sqrt(1.0 - keep**2) * errors[k]
+    way += (lasting * errors + white * rng.normal(size=(rows, 3))) * [1.0, 1.0, 2.0]
+    place = geodetic_from_ned(way, (48.1, 11.5, 500.0))
+    sd = np.hypot(white, lasting)
+    return t, place, v + 0.2 * rng.normal(size=(rows, 3)), (sd, sd, 2 * sd), (0.2, 0.2, 0.2)
+
+
+KINDS = [(0.0, 0.5, 2.0), (0.3, 1.0, 2.0), (1.3, 0.5, 1.0), (15.0, 0.3, 1.0), (15.0, 2.0, 4.0)]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_right_velocities_are_never_refused_nor_called_unlike(kind):
+    """A stand, a crawl, a walk and drives; stated deviations are wrong by a factor of two, too."""
+    for seed in range(40):
+        t, place, v, sd, v_sd = drawn(seed, *kind)
+        for wrong in (0.5, 1.0, 2.0):
+            table = tables.gnss_table(t, place, v, wrong * np.array(sd), v_sd)
+            fit = check_velocity(table)
+            assert fit is None or fit.name
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "data"),
+    [
+        (lambda v: v * [-1, -1, 1], "tables.velocity-turned", {"north": "-VN", "east": "-VE"}),
+        (lambda v: v * [-1, 1, 1], "tables.velocity-turned", {"north": "-VN", "east": "VE"}),
+        (lambda v: v[:, [1, 0, 2]] * [1, -1, 1], "tables.velocity-turned", {"north": "-VE"}),
+        (lambda v: v[:, [1, 0, 2]], "tables.velocity-north-east-exchanged", {}),
+        (lambda v: v / 0.44704, "tables.velocity-in-other-unit", {"unit": "mph"}),
+        (lambda v: v * 100, "tables.velocity-in-other-unit", {"unit": "cm/s"}),
+        (lambda v: v * [1, 1, -1], "tables.velocity-up", {}),
+    ],
+)
+@pytest.mark.parametrize("kind", KINDS[2:4])
+def test_another_direction_or_unit_is_told_of_a_walk_and_of_a_drive(change, code, data, kind):
+    for seed in range(5):
+        t, place, v, sd, v_sd = drawn(seed, *kind, hill=40.0)
+        with pytest.raises(DataError) as refused:
+            tables.gnss_table(t, place, change(v), sd, v_sd)
+        assert refused.value.finding.code == code
+        assert data.items() <= refused.value.finding.data.items()
+
+
+def test_velocities_of_nothing_are_called_unlike():
+    """As in body axes: forward, and nothing to the right."""
+    t, place, v, sd, v_sd = drawn(3, 15.0, 0.3, 1.0)
+    body = np.column_stack([np.hypot(v[:, 0], v[:, 1]), np.zeros(len(v)), v[:, 2]])
+    fit = check_velocity(tables.gnss_table(t, place, body, sd, v_sd))
+    assert fit is not None and not fit.name
+
+
+def test_places_in_radians_move_too_slowly():
+    t, place, v, sd, v_sd = drawn(2, 15.0, 0.3, 1.0)
+    with pytest.raises(DataError, check=coded("tables.places-in-radians")):
+        tables.gnss_table(t, place * [np.radians(1.0), np.radians(1.0), 1.0], v, sd, v_sd)
 
 
 def test_false_fixes_a_stand_and_unmeasured_velocities_are_no_wrong_units():

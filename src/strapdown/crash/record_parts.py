@@ -45,7 +45,15 @@ from strapdown.formats.inference.rotation_rate import infer_gyro
 from strapdown.formats.triad_units import mirrored
 from strapdown.formats.vocabularies import AXIS_WORDS, CRASHES
 from strapdown.sensors.saturation import find_limits
-from strapdown.units import ACCEL_UNITS, FACTORS, GYRO_UNITS, SPEEDS, TIME_UNITS, find_unit
+from strapdown.units import (
+    ACCEL_UNITS,
+    FACTORS,
+    GYRO_UNITS,
+    INFERRED,
+    SPEEDS,
+    TIME_UNITS,
+    find_unit,
+)
 
 Array = NDArray[np.float64]
 Left = list[tuple[str, str]]
@@ -756,7 +764,7 @@ def gyro_unit(time: Array, values: Array, quiet: Quiet) -> Answer:
     crash = slice(
         max(quiet.samples - 1, 0) if quiet.samples < len(values) - LEAST_QUIET else 0, None
     )
-    said, _, _, _ = infer_gyro(time[crash] - time[crash][0], values[crash], None, {"s": 1.0})
+    said, *_, _ = infer_gyro(time[crash] - time[crash][0], values[crash], None, {"s": 1.0})
     prior = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
     peak = float(np.abs(values - quiet.mean).max())
     offset = float(np.abs(quiet.mean).max())
@@ -840,7 +848,7 @@ def _off_gravity(part: Part) -> float:
     length = float(np.linalg.norm(quiet_part(part.values).mean)) if len(part.axes) == 3 else 0.0
     if length <= 0.0:
         return math.inf
-    known = (STANDARD_GRAVITY / s for s in ACCEL_UNITS.values() if s > 0.0)
+    known = (STANDARD_GRAVITY / s for u in INFERRED["accel"] if (s := ACCEL_UNITS[u]) > 0.0)
     return min(abs(math.log(length / g)) for g in known)
 
 
@@ -929,7 +937,7 @@ def _overlaps(a: Part, b: Part) -> bool:
 def _by_another(part: Part, known: Sequence[Part]) -> Part | None:
     if part.kind not in ("", "acceleration"):
         return None
-    scales = {u: s for u, s in ACCEL_UNITS.items() if s > 0.0}
+    scales = {u: s for u in INFERRED["accel"] if (s := ACCEL_UNITS[u]) > 0.0}
     for other in sorted(known, key=lambda q: q.path != part.path):
         slope, correlation = agreement(other, part) if _overlaps(other, part) else (0.0, 0.0)
         if correlation < LEAST_CORRELATION or slope <= 0.0:

@@ -35,6 +35,7 @@ from strapdown.formats.find_columns import (
     names_of_fixes,
     reference,
     steady_triads,
+    unit_stated,
     without_gyro,
 )
 from strapdown.formats.inference.conclusion import infer_accel
@@ -81,6 +82,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     ConfigError: an option names a column that does not exist.
     """
     questions = Questions(raw.name)
+    raw = _with_force_of_parts(raw, options)
     found = find_columns(raw, options, questions)
     if missing := [q for q in GYRO if q not in found]:
         raise without_gyro(raw, missing)
@@ -249,6 +251,50 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         findings=tuple(log.findings),
         start=raw.start,
         temperature=_temperature(raw, time, kept),
+    )
+
+
+def _with_force_of_parts(raw: RawLog, options: ReadOptions) -> RawLog:
+    """Return a log whose force is linear acceleration plus gravity, where it has no other.
+
+    Both as phones write them, in one unit. A name of Core Motion, user acceleration, is left: its
+    sign is a question of its own.
+    """
+    if raw.stated or any(q.startswith("accel") for q in options.columns):
+        return raw
+    parts: dict[bool, dict[str, str]] = {True: {}, False: {}}
+    for name, column in raw.columns.items():
+        said = read_name(name)
+        triad, _, axis = str(said.quantity).partition("_")
+        if triad not in ("accel", "gravity") or not axis:
+            continue
+        is_gravity = triad == "gravity"
+        if not (is_gravity or said.linear) or axis in parts[is_gravity]:
+            return raw  # an accelerometer of its own, or one that is there twice
+        if "user" in said.family or column.dtype.kind not in "iuf":
+            return raw
+        parts[is_gravity][axis] = name
+    gravity, linear = parts[True], parts[False]
+    names = [*linear.values(), *gravity.values()]
+    units = {unit_stated(raw, name) for name in names}
+    if not len(gravity) == len(linear) == len(AXES) or len(units) != 1:
+        return raw
+    columns = {name: column for name, column in raw.columns.items() if name not in names}
+    sums = {f"accel_{a}": raw.columns[linear[a]] + raw.columns[gravity[a]] for a in AXES}
+    unit = units.pop()
+    stated = dict.fromkeys(sums, unit) if unit else {}
+    finding = Finding(
+        "io.force-of-linear-and-gravity",
+        severity="note",
+        file=raw.name,
+        quantity="accel",
+        names=names,
+    )
+    return dataclasses.replace(
+        raw,
+        columns={**columns, **sums},
+        units={**raw.units, **stated},
+        findings=[*raw.findings, finding],
     )
 
 

@@ -66,7 +66,10 @@ _LEAPS = (
     (1_435_708_800.0, 17),
     (1_483_228_800.0, 18),
 )
-_WORDS = {GPS: {"sow", "tow", "gpssow", "gpstow", "gpst", "gps"}, UNIX: {"unix", "utc", "unixtime"}}
+_WORDS = {
+    GPS: {"sow", "tow", "gpssow", "gpstow", "gpst", "gps", "itow"},
+    UNIX: {"unix", "utc", "unixtime"},
+}
 # Lower limit of Unix time (2001); no sensor has counted that long since its start.
 _MODERN = 1e9  # s
 # And upper, 2045: seconds since 1904 or 1900 are beyond it.

@@ -27,6 +27,7 @@ from strapdown.formats.vocabularies import (
     NOISE,
     OF_TIME,
     OTHER_QUANTITY,
+    PARTS,
     PLACES,
     PX4,
     QUANTITIES,
@@ -358,6 +359,11 @@ def _words_of(text: str) -> list[str]:
     """Return the words of a name, in lower case and in English where they are known."""
     plain = _SCRIPTS.sub(" ", without_accents(text))  # an accent parts no word: Längs
     return [e for w in _HUMPS.findall(plain) for e in _english(w.lower())]
+
+
+def parts_in(name: str) -> frozenset[str]:
+    """Return the words of a name that say on which part of a body a sensor is."""
+    return frozenset(_words_of(split_brackets(name)[0])) & PARTS
 
 
 def _english(word: str) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from strapdown.errors import DataError
 from strapdown.formats.arrays import numbers
 from strapdown.formats.find_columns import Found
 from strapdown.formats.recording import RawLog
+from strapdown.tables.checks import POSITION_SD, VELOCITY_SD
 
 Array = NDArray[np.float64]
 
@@ -58,12 +59,15 @@ def with_degrees(raw: RawLog, found: Mapping[str, Found]) -> RawLog:
             changed[source] = side * np.abs(np.asarray(size, dtype=np.float64))
     places = {q: changed.get(found[q].source, raw.columns[found[q].source]) for q in _ANGLES}
     if all(v.dtype.kind in "iuf" for v in places.values()):
+        if not any(found[q].stated for q in _ANGLES):
+            _refuse_radians_open(raw, places)
         form, scaled = _in_one_number(places)
         changed |= {found[q].source: v for q, v in scaled.items()}
         # A name that says it (latitudeE7) says that heights are not scaled likewise.
         if form == "1e-7 deg" and not found["lat"].source.lower().endswith("e7"):
             _refuse_open_scale(raw, scaled)
             changed |= _heights_in_mm(raw, found)
+            _refuse_accuracies_open(raw, found)
         if form:
             raw.note(
                 "io.coordinates-in-one-number",
@@ -166,6 +170,23 @@ def _in_one_number(places: Mapping[str, NDArray[Any]]) -> tuple[str, dict[str, A
     return "", {}
 
 
+#: Largest latitude and longitude in radians; as degrees they are in the sea off Guinea. Nearer to
+#: zero than this, which is 1 km in degrees, either may be an origin.
+_RADIANS, _ORIGIN = {"lat": 0.5 * np.pi, "lon": np.pi}, 0.01
+
+
+def _refuse_radians_open(raw: RawLog, places: Mapping[str, NDArray[Any]]) -> None:
+    """Ask for the unit of coordinates that are as well in radians, somewhere on the Earth."""
+    size = {q: np.abs(np.asarray(v, dtype=np.float64)) for q, v in places.items()}
+    if all(v.size and np.isfinite(v).any() for v in size.values()):
+        largest = {q: float(np.nanmax(v)) for q, v in size.items()}
+        whole = all((v[np.isfinite(v)] % 1.0 == 0.0).all() for v in size.values())
+        inside = all(v <= _RADIANS[q] for q, v in largest.items())
+        if inside and not whole and max(largest.values()) > _ORIGIN:
+            first = {q: float(v[np.isfinite(v)][0]) for q, v in places.items()}
+            raise raw.fault("io.degrees-or-radians", "lat, lon", lat=first["lat"], lon=first["lon"])
+
+
 def _refuse_open_scale(raw: RawLog, degrees: Mapping[str, Array]) -> None:
     """Refuse whole numbers that are within the Earth's range in 1e-6 deg as well as in 1e-7."""
     if all(float(np.nanmax(np.abs(degrees[q]))) <= 0.1 * _ANGLES[q][0] for q in _ANGLES):
@@ -194,6 +215,36 @@ def _heights_in_mm(raw: RawLog, found: Mapping[str, Found]) -> dict[str, Array]:
             raise height_unit_open(raw, "io.height-unit-open", quantity, one, float(known[0]))
         out[one.source] = heights * 1e-3
     return out
+
+
+#: Quantities that are whole numbers of mm, or mm/s, where coordinates are of 1e-7 deg.
+_ACCURACIES = ("horizontal_accuracy", "vertical_accuracy", *POSITION_SD)
+_ACCURACIES_OF_SPEED = ("speed_sd", *VELOCITY_SD)
+
+
+def _refuse_accuracies_open(raw: RawLog, found: Mapping[str, Found]) -> None:
+    """Ask for the unit of accuracies that are whole numbers, as the coordinates are."""
+    asked: dict[str, tuple[Found, float]] = {}
+    for quantity in (*_ACCURACIES, *_ACCURACIES_OF_SPEED):
+        one = found.get(quantity)
+        if one is None or one.stated:
+            continue
+        values = np.asarray(numbers(raw, one.source, quantity), dtype=np.float64)
+        known = values[np.isfinite(values)]
+        if known.size and (known % 1.0 == 0.0).all() and (known > 1.0).any():
+            asked[quantity] = one, float(known[0])
+    if asked:
+        units = {q: "mm" if q in _ACCURACIES else "mm/s" for q in asked}
+        column, first = next(iter(asked.values()))
+        raise raw.fault(
+            "io.accuracy-unit-open",
+            ", ".join(asked),
+            source=column.source,
+            first=first,
+            python="{" + ", ".join(f'"{q}": "{u}"' for q, u in units.items()) + "}",
+            flags="--gnss-units " + ",".join(f"{q}={u}" for q, u in units.items()),
+            keys="units = {" + ", ".join(f'{q} = "{u}"' for q, u in units.items()) + "}",
+        )
 
 
 def height_unit_open(

@@ -113,7 +113,7 @@ def _at_once(
             stream.seek(max(0, size - HEAD))
             tail = stream.read()
     try:
-        text = head[: head.rfind(b"\n") + 1].decode("utf-8-sig")
+        text, findings = _read_once(head[: head.rfind(b"\n") + 1].decode("utf-8-sig"), name)
     except UnicodeDecodeError:
         return None
     if not text or "\0" in text or _BREAKS.search(text):
@@ -140,7 +140,7 @@ def _at_once(
     # Nor are blanks beside a separator part of a word.
     if any(c.dtype.kind == "O" for c in columns) and f"{top.separator} " in text:
         return None
-    return top.log(name, files, columns, np.arange(first, first + columns[0].size), [])
+    return top.log(name, files, columns, np.arange(first, first + columns[0].size), findings)
 
 
 def _line_by_line(
@@ -994,11 +994,45 @@ def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
                 return data.decode(code, "replace"), []
         raise DataError("io.text-with-zero-bytes", file=name)
     try:
-        return data.decode("utf-8-sig"), []
+        return _read_once(data.decode("utf-8-sig"), name)
     except UnicodeDecodeError as error:
         return data.decode("cp1252", "replace"), [
             Finding("io.not-utf-8", file=name, severity="note", byte=error.start)
         ]
+
+
+#: Codes in which programs read UTF-8 by mistake.
+_MISTAKEN = ("cp1252", "cp1251")
+
+
+def _read_once(text: str, name: str) -> tuple[str, list[Finding]]:
+    """Repair lines at the top that are UTF-8 read in another code, and written in UTF-8 again.
+
+    ``Â°/s`` is the degree in cp1252. Letters of no other text make UTF-8 in such a code, so that
+    every line with such letters has to, in the same.
+    """
+    cut = text.find("\n", 1 << 13)
+    top = text if cut < 0 else text[:cut]
+    odd = [line for line in top.split("\n") if not line.isascii()]
+    for code in _MISTAKEN if odd else ():
+        try:
+            right = {line: _bytes_of(line, code).decode("utf-8") for line in odd}
+        except UnicodeError:
+            continue
+        lines = [right.get(line, line) for line in top.split("\n")]
+        wrong, said = odd[0].strip()[:60], right[odd[0]].strip()[:60]
+        found = Finding(
+            "io.text-decoded-twice", severity="note", file=name, wrong=wrong, right=said
+        )
+        return "\n".join(lines) + text[len(top) :], [found]
+    return text, []
+
+
+def _bytes_of(line: str, code: str) -> bytes:
+    """Encode a line; signs of control that the code does not have are themselves."""
+    return b"".join(
+        bytes([ord(c)]) if 0x80 <= ord(c) < 0xA0 else c.encode(code, "strict") for c in line
+    )
 
 
 def is_comment(line: str) -> bool:

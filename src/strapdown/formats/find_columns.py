@@ -18,7 +18,9 @@ from strapdown.formats.columns import (
     UNKNOWN_WORDS,
     ColumnName,
     clocks_with_unit,
+    parts_in,
     read_name,
+    split_brackets,
 )
 from strapdown.formats.recording import INFERRED, STATED, Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import (
@@ -30,7 +32,7 @@ from strapdown.formats.vocabularies import (
     Quantity,
     Vocabulary,
 )
-from strapdown.units import ACCEL_UNITS, GYRO_UNITS, OF_TABLES, unit_of
+from strapdown.units import ACCEL_UNITS, GYRO_UNITS, OF_TABLES, find_unit, unit_of
 
 Array = NDArray[np.float64]
 AXES = "xyz"
@@ -112,10 +114,36 @@ def find_columns(
     for q, name in wanted.items():
         stated = found[q].unit if q in found and found[q].source == name else None
         basis: Basis = "open" if q in inferred else "option"
-        found[q] = Column(name, _unit_of(raw, name) or stated, basis)
+        found[q] = Column(name, unit_stated(raw, name) or stated, basis)
+    if not (raw.stated or wanted.keys() & {"gyro_x", "accel_x"}):
+        _ask_parts(raw, found, asked_here)
     if questions is None:
         asked_here.refuse()
     return found
+
+
+def _ask_parts(raw: RawLog, found: Mapping[str, Column], questions: Questions) -> None:
+    """Ask whether a gyro and an accelerometer of different parts of a body belong together."""
+    if not {"gyro_x", "accel_x"} <= found.keys():
+        return
+    gyro, accel = (parts_in(found[f"{triad}_x"].source) for triad in ("gyro", "accel"))
+    if gyro and accel and not gyro & accel:
+        names = [found[f"{t}_{a}"].source for t in ("gyro", "accel") for a in AXES]
+        columns = {
+            f"{t}_{a}": reference(raw, found[f"{t}_{a}"].source)
+            for t in ("gyro", "accel")
+            for a in AXES
+            if f"{t}_{a}" in found
+        }
+        fault = Finding(
+            "io.sensors-of-different-parts",
+            file=raw.name,
+            quantity="accel",
+            gyro=" ".join(sorted(gyro)),
+            accel=" ".join(sorted(accel)),
+            names=names,
+        )
+        questions.ask(fault, **columns)
 
 
 def names_of_quantities(raw: RawLog) -> set[str]:
@@ -393,10 +421,19 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
     families = _families(raw, said)
     if ("gyro", "g") in families:
         _letter_g(raw, families, wanted, questions, found)
-    for triad in TRIADS:
-        kept = _best({f: m for (t, f), m in families.items() if t == triad}, said)
+    of_triads = {t: _best({f: m for (k, f), m in families.items() if k == t}, said) for t in TRIADS}
+    shared = frozenset.intersection(
+        *(
+            frozenset().union(*(parts_in(next(iter(m.values()))) for m in of_triads[t].values()))
+            for t in ("gyro", "accel")
+        )
+    )
+    for triad, kept in of_triads.items():
         if not kept:
             continue
+        # Of several parts of a body, those that have a gyro and an accelerometer.
+        paired = {f: m for f, m in kept.items() if parts_in(next(iter(m.values()))) & shared}
+        kept = paired or kept
         # In a file of several units, those of the unit whose columns are asked for.
         inside = {n.rpartition("/")[0] for q, n in wanted.items() if q[:-2] in TRIADS} - {""}
         of_unit = {
@@ -449,7 +486,7 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
             )
     if "time" not in {*found, *wanted} and (clock := clock_by_values(raw)):
         found["time"] = clock
-    return {q: Column(name, _unit_of(raw, name), "name") for q, name in found.items()}
+    return {q: Column(name, unit_stated(raw, name), "name") for q, name in found.items()}
 
 
 #: Names of counters that may be clocks, if no other column is.
@@ -535,7 +572,7 @@ def _letter_g(
     there.
     """
     own = families["gyro", "g"]
-    units = {_unit_of(raw, name) for name in own.values()}
+    units = {unit_stated(raw, name) for name in own.values()}
     if units <= set(GYRO_UNITS) or set(own.values()) & set(wanted.values()):
         return
     linear = [n for (t, _), m in families.items() if t == "accel" for n in m.values()]
@@ -600,7 +637,7 @@ def _one_clock(raw: RawLog, names: list[str]) -> list[str]:
     names = [n for n in names if is_clock(raw, n)] or names
     # A stamp that a spreadsheet rounded is the same in every row.
     names = [n for n in names if len(set(raw.columns[n][:2].tolist())) > 1] or names
-    names = clocks_with_unit(names, lambda n: _unit_of(raw, n) is not None)
+    names = clocks_with_unit(names, lambda n: unit_stated(raw, n) is not None)
     if len(names) > 1 and all(raw.columns[n].dtype.kind in "iuf" for n in names):
         steps = [np.diff(raw.columns[n].astype(np.float64)) for n in names]
         scaled = [s / s.mean() if s.size and s.mean() > 0.0 else None for s in steps]
@@ -622,10 +659,40 @@ def is_clock(raw: RawLog, name: str) -> bool:
     return values.dtype.kind != "O" or bool(values.size and is_stamp(str(values[0])))
 
 
-def _unit_of(raw: RawLog, column: str) -> str | None:
+def unit_stated(raw: RawLog, column: str) -> str | None:
+    """Return the unit of a column of a sensor, as a row of units, its name or ROS states it."""
     if column in raw.units:
         return unit_of(raw.units[column])
     return read_name(column).unit or _ros_unit(raw, column)
+
+
+#: Words in brackets behind a name, or in a row of units, that say no unit.
+_NO_UNITS = re.compile(
+    r"[\W\d_]*|[xyz]|x[- ]?axis|y[- ]?axis|z[- ]?axis|none|n/?a|null|unitless|dimensionless|vector|"
+    r"(?:un)?calib\w*|(?:un)?compensated|corrected|filter\w*|smooth\w*|sensor|device|body|float\w*|"
+    r"double|(?:imu|sensor|unit)[\W_]?\w*|left|right|front|rear|back|up|down|roll|pitch|yaw|"
+    r"\w*[. ]\w*",
+    re.I,
+)
+
+
+#: Quantities whose units a sensor may have; degrees are often those per second.
+_OF_TRIADS = {
+    "gyro": ("rate", "angle"),
+    "accel": ("acceleration", "change of velocity", "velocity"),
+    "mag": ("magnetic field", "magnetic field, relative", "acceleration"),
+}
+
+
+def stated_word(raw: RawLog, column: str, triad: str) -> str:
+    """Return the word that a file has in place of the unit of a sensor's column; empty if none.
+
+    Of a row of units, or in brackets behind the name, where it is no unit of such a sensor.
+    """
+    text = raw.units.get(column, "").strip().strip("[]()").strip()
+    text = text or split_brackets(column)[1].strip()
+    known = not text or find_unit(text, _OF_TRIADS[triad])
+    return "" if known or _NO_UNITS.fullmatch(text) else text
 
 
 ROS_FIELD = re.compile(rf"(.*({'|'.join(ROS)}))[./][xyz]")
@@ -850,7 +917,11 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
     if not raw.stated:
         names = list(raw.columns)
         clocks = [n for n in names if read_name(n, FIXES).quantity == "time"]
-        if len(clocks) > 1:
+        if of_ublox := [n for n in clocks if plain_name(n) == "itow"]:
+            # Beside it are the parts of a date: year, month, day, hour, min, sec.
+            other = set(clocks) - {of_ublox[0], *asked.values()}
+            names = [n for n in names if n not in other]
+        elif len(clocks) > 1:
             # A lone T is as often a temperature; a text that is no stamp is no clock.
             other = {n for n in clocks if n == "T" or not is_clock(raw, n)} - set(asked.values())
             names = [n for n in names if n not in other or other >= set(clocks)]
@@ -866,6 +937,11 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
     }
     named = find_quantities(raw.columns, FIXES, asked, raw.name) if asked else {}
     return found | {quantity: named[quantity] for quantity in asked}
+
+
+def plain_name(name: str) -> str:
+    """Return the letters and digits of a name, or of what is behind its last point or slash."""
+    return re.sub(r"[\W_]", "", re.split(r"[./]", name)[-1].lower())
 
 
 def names_of_fixes(raw: RawLog) -> set[str]:

@@ -7,6 +7,7 @@ import re
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,7 +18,7 @@ from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import STEP_OF_FIXES, epoch_of, numbers, open_dates
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock
 from strapdown.formats.coordinates import height_unit_open, with_degrees
-from strapdown.formats.find_columns import Found, fix_columns, names_of_quantities
+from strapdown.formats.find_columns import Found, fix_columns, names_of_quantities, plain_name
 from strapdown.formats.gnss_fixes import (
     NOWHERE,
     RADIUS,
@@ -33,6 +34,7 @@ from strapdown.formats.trajectory_readers import EARTH
 from strapdown.formats.vocabularies import FIXES
 from strapdown.frames import geodetic_from_ecef, geodetic_from_ned, geodetic_from_utm
 from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD, height_words
+from strapdown.tables.gnss import LEAST_STEPS, SPEEDS_OF_OTHERS, along_course, fitting
 from strapdown.units import DATE_ORDERS, OF_TABLES, SPEEDS, TIME_UNITS, unit_of
 
 # GNSS fixes from tables with column names: text, Parquet.
@@ -50,7 +52,8 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     north, east, up of an origin that the user states. DataError: time or the position is missing,
     two columns fit one quantity, or a unit is unknown.
     """
-    found = _in_units(raw, fix_columns(raw, options.columns), options.units)
+    found = _of_ublox(raw, fix_columns(raw, options.columns))
+    found = _in_units(raw, found, options.units)
     raw = _rows_of_fixes(with_degrees(raw, found), found)
     _refuse_missing(raw, found, stated=options.datum_height is not None)
 
@@ -81,7 +84,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     if velocity is not None and velocity_sd is None and "speed_sd" in found:
         velocity_sd = _sd_of_speed(raw, found, values)
     if velocity is None and {"speed", "course"} <= found.keys():
-        velocity, velocity_sd = _over_ground(raw, found, values)
+        velocity, velocity_sd = _over_ground(raw, found, values, (time, place))
     if velocity is not None:
         _refuse_unit_of_speed(raw, found, time, place, velocity)
     return Fixes(
@@ -101,6 +104,52 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     )
 
 
+#: Units of whole numbers in UBX-NAV-PVT of u-blox (Interface Description, NAV-PVT), by name.
+_NAV_PVT = {
+    **dict.fromkeys(("height", "hmsl", "hacc", "vacc"), "mm"),
+    **dict.fromkeys(("veln", "vele", "veld", "gspeed", "sacc"), "mm/s"),
+    "headmot": "1e-5 deg",
+}
+#: Fields that no other table has under these names; and the fewest of all that say it.
+_OF_NAV_PVT, _LEAST_FIELDS = {"itow", "gspeed", "headmot", "headacc", "fixtype", "hmsl"}, 3
+
+
+def _of_ublox(raw: RawLog, found: dict[str, Found]) -> dict[str, Found]:
+    """Give the columns of a table of UBX-NAV-PVT, in whole numbers, their units, and report it.
+
+    Programs scale some of them and leave others: a course that is none of whole numbers is in deg,
+    and all others are whole, or none is taken so.
+    """
+    names = {plain_name(name) for name in raw.columns}
+    if raw.stated or not names & _OF_NAV_PVT or len(names & _NAV_PVT.keys()) < _LEAST_FIELDS:
+        return found
+    out, units, whole = dict(found), {}, []
+    for quantity, one in found.items():
+        unit = "ms" if quantity == "time" else _NAV_PVT.get(plain_name(one.source))
+        if unit is None or one.stated or raw.columns[one.source].dtype.kind not in "iuf":
+            continue
+        if unit == "mm/s" and "cacc" in names:  # of UBX-NAV-VELNED, which has no other unit
+            unit = "cm/s"
+        values = np.asarray(numbers(raw, one.source, quantity), dtype=np.float64)
+        known = values[np.isfinite(values)]
+        are_whole = bool((known % 1.0 == 0.0).all())
+        if quantity == "time":  # seconds of a week do not go so far
+            if are_whole and known.size and WEEK < known.max() < 1e3 * WEEK:
+                out[quantity] = Found(one.source, one.factor * 1e-3, True)
+                units[one.source] = unit
+            continue
+        if quantity != "course":
+            whole.append(are_whole)
+        if are_whole:
+            factor = FIXES.quantities[quantity].units[unit]
+            out[quantity] = Found(one.source, one.factor * factor, True)
+            units[one.source] = unit
+    if not units or not all(whole):
+        return found
+    raw.note("io.units-of-ublox", units=[f"{name} {unit}" for name, unit in units.items()])
+    return out
+
+
 def _in_units(raw: RawLog, found: dict[str, Found], units: Mapping[str, str]) -> dict[str, Found]:
     """Replace the units of columns by those that the user states."""
     stated = {}
@@ -112,9 +161,13 @@ def _in_units(raw: RawLog, found: dict[str, Found], units: Mapping[str, str]) ->
         if quantity == "time" and unit in DATE_ORDERS:
             continue
         known = FIXES.quantities[quantity].units
-        spelled = unit_of(unit, OF_TABLES) or unit
+        bare = unit.strip()
+        # A minus is of a column that counts the other way: VD=-m/s of a velocity up.
+        sign = -1.0 if bare.startswith("-") and known else 1.0
+        bare = bare[1:] if sign < 0.0 else bare
+        spelled = unit_of(bare, OF_TABLES) or bare
         check_choice("io.unknown-unit", known, quantity=f"units {quantity}", unit=spelled)
-        sign = -1.0 if found[quantity].factor < 0.0 else 1.0
+        sign *= -1.0 if found[quantity].factor < 0.0 else 1.0
         stated[quantity] = Found(found[quantity].source, sign * known[spelled], True)
     return found | stated
 
@@ -296,17 +349,24 @@ def _rows_of_fixes(raw: RawLog, found: dict[str, Found]) -> RawLog:
 
 
 def _over_ground(
-    raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]
+    raw: RawLog,
+    found: dict[str, Found],
+    values: Callable[[str], Array],
+    positions: tuple[Array, Array],
 ) -> tuple[Array | None, Array | None]:
     """Return velocity by speed and course, and its standard deviation; down is unknown.
 
-    Phones write -1 for a speed or a course that they do not know; None where they never do.
+    Phones write -1 for a speed or a course that they do not know; None where they never do. Other
+    courses below zero are those of angles from -180 deg. `positions`: seconds, (n,), and places,
+    (n, 3): they tell the unit and the sense of a course of which the file states none.
     """
     speed, course = values("speed"), values("course")
-    known = (speed >= 0.0) & (course >= 0.0)
+    ahead = np.sign(found["speed"].factor)  # a minus is of a user, where courses point backward
+    known = (ahead * speed >= 0.0) & np.isfinite(course)
+    known &= (course >= 0.0) | (found["course"].factor < 0.0) | _is_signed(course)
     never = not known.any()
     speed = np.where(known, speed, np.nan)
-    angle, none = np.radians(course), np.full(speed.size, np.nan)
+    none = np.full(speed.size, np.nan)
     raw.note(
         "io.speed-and-course-never-known" if never else "io.velocity-by-speed-and-course",
         quantity=", ".join(VELOCITY),
@@ -315,12 +375,89 @@ def _over_ground(
     )
     if never:
         return None, None
+    if not (raw.stated or found["course"].stated):
+        _refuse_unit_of_course(raw, found, speed, course, positions)
     sd = None
     if "speed_sd" in found:
         stated = values("speed_sd")
         sd = np.where(known & (stated > 0.0), stated, np.nan)
         sd = np.column_stack([sd, sd, none])
-    return np.column_stack([speed * np.cos(angle), speed * np.sin(angle), none]), sd
+    return np.column_stack([along_course(speed, np.radians(course)), none]), sd
+
+
+def _is_signed(course: Array) -> bool:
+    """Whether courses below zero are angles, and not all of them the -1 of a phone."""
+    below = course[course < 0.0]
+    return bool(below.size and (below != -1.0).any())
+
+
+#: Ways in which a course is written, by the statement that says it: factor to deg, and offset.
+_COURSES = {
+    "deg": (1.0, 0.0),
+    "rad": (np.degrees(1.0), 0.0),
+    "cdeg": (1e-2, 0.0),
+    "1e-5 deg": (1e-5, 0.0),
+    "-deg": (-1.0, 0.0),
+    "-rad": (-np.degrees(1.0), 0.0),
+    "": (1.0, 180.0),
+    "from east": (-1.0, 90.0),
+    "from east in rad": (-np.degrees(1.0), 90.0),
+}
+#: Standard deviation of positions that state none, m; more than a turn, deg.
+_UNSTATED_SD, _TURN = 5.0, 360.5
+
+
+def _refuse_unit_of_course(
+    raw: RawLog,
+    found: dict[str, Found],
+    speed: Array,
+    course: Array,
+    positions: tuple[Array, Array],
+) -> None:
+    """Refuse courses without a unit that the positions show to be in none, or of another sense."""
+    time, place = positions
+    known = np.isfinite(place).all(axis=1) & np.isfinite(speed * course) & np.isfinite(time)
+    later = np.flatnonzero(known)
+    later = later[np.diff(np.maximum.accumulate(time[later]), prepend=-np.inf) > 0.0]
+    largest = float(np.abs(course[known]).max(initial=0.0))
+    units = ("m/s",) if found["speed"].stated else ("m/s", *SPEEDS_OF_OTHERS)
+    at = place[later]
+    readings = {
+        f"{way},{unit}": (
+            along_course(SPEEDS[unit] * speed[later], np.radians(factor * course[later] + zero)),
+            at,
+        )
+        for way, (factor, zero) in _COURSES.items()
+        for unit in units
+    }
+    sd = np.full(later.size, _UNSTATED_SD)
+    fit = fitting(time[later], sd, readings) if later.size > LEAST_STEPS else None
+    way, _, unit = (fit.name if fit else "").partition(",")
+    if way == "deg" or (not unit and largest <= _TURN):
+        return
+    beyond = not unit
+    if beyond:
+        way, unit = "cdeg" if largest <= 100.0 * _TURN else "1e-5 deg", "m/s"
+    stated = {} if unit == "m/s" else {"speed": unit}
+    if way == "":
+        stated["speed"] = f"-{unit}"
+    elif "east" not in way:
+        stated["course"] = way
+    said: dict[str, Any] = {
+        "python": "{" + ", ".join(f'"{q}": "{u}"' for q, u in stated.items()) + "}",
+        "flags": "--gnss-units " + shlex.quote(",".join(f"{q}={u}" for q, u in stated.items())),
+        "keys": "units = {" + ", ".join(f'{q} = "{u}"' for q, u in stated.items()) + "}",
+    }
+    code = "io.course-unit-not-stated"
+    if beyond:
+        code = "io.course-beyond-turn"
+    elif "east" in way:
+        code = "io.course-from-east"
+    elif way == "":
+        code = "io.course-points-back"
+    raise raw.fault(
+        code, "course", source=found["course"].source, largest=largest, unit=way, **said
+    )
 
 
 def _sd_of_speed(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]) -> Array:
@@ -334,8 +471,8 @@ def _sd_of_speed(raw: RawLog, found: dict[str, Found], values: Callable[[str], A
 
 #: Steps between fixes from which a speed is computed, s, and the least distance in them, m.
 _STEPS, _WAY = (0.05, 10.0), 50.0
-#: Units that a speed without one may have, and how near the ratio to that of the positions is.
-_SPEEDS, _NEAR = ("km/h", "kn", "mph", "cm/s", "mm/s"), 0.04
+#: How near the ratio to the speed of the positions is that of a unit.
+_NEAR = 0.04
 
 
 def _refuse_unit_of_speed(
@@ -366,7 +503,7 @@ def _refuse_unit_of_speed(
     ratio = float(asked @ way) / size
     off = way - ratio * asked
     sd = float(np.sqrt(off @ off / max(off.size - 1, 1) / size))
-    unit = next((u for u in _SPEEDS if abs(ratio / SPEEDS[u] - 1.0) < _NEAR), None)
+    unit = next((u for u in SPEEDS_OF_OTHERS if abs(ratio / SPEEDS[u] - 1.0) < _NEAR), None)
     if unit is None or 2.0 * sd > _NEAR * ratio:
         return
     answer = dict.fromkeys(names, unit)

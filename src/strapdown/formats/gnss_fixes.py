@@ -15,6 +15,7 @@ from strapdown.formats.arrays import told_by_file_rows
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
 from strapdown.tables import gnss_table
 from strapdown.tables.checks import GEODETIC, HEIGHTS_AS_STATED, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables.gnss import check_velocity
 
 Array = NDArray[np.float64]
 Sd = float | tuple[float, float, float]
@@ -159,6 +160,17 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
             velocity_sd[at],
             quality[at],
             source=fixes.name,
+        )
+    fit = check_velocity(table)
+    if fit is not None and not fit.name:
+        add_warning(
+            fixes.findings,
+            "io.velocity-unlike-positions",
+            file=fixes.name,
+            row=int(fixes.rows[at[fit.row]]),
+            quantity="VN, VE",
+            speed=fit.speed,
+            moved=fit.moved,
         )
     if fixes.satellites is not None:
         table["satellites"] = fixes.satellites[at]

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.arrays import as_rows, numbers
 from strapdown.formats.columns import parse_axes, read_name
-from strapdown.formats.find_columns import AXES, Column
+from strapdown.formats.find_columns import AXES, Column, stated_word
 from strapdown.formats.inference.conclusion import THRESHOLD, Inference
 from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
@@ -23,8 +24,10 @@ from strapdown.tables.on_disk import let_go, room
 from strapdown.units import (
     ACCEL_SUMS,
     ACCEL_UNITS,
+    COUNTS,
     GYRO_SUMS,
     GYRO_UNITS,
+    INFERRED,
     MAG_UNITS,
     RELATIVE_FIELDS,
     factor_of,
@@ -81,9 +84,9 @@ def told_by_numbers(log: LogInUse, ticks: NDArray[Any] | None, dated: bool) -> d
     if ticks is not None and not dated:
         asked = log.options.time_unit
         unit = parse_unit(asked, "time") if asked else log.found["time"].unit
-    values, rate = log.values, log.options.rate or log.raw.rate
-    triads = values["gyro"], values.get("accel"), values.get("mag")
-    signals = Signals(ticks, *triads, time_unit=unit, rate=rate)
+    rate = log.options.rate or log.raw.rate
+    triads = {t: _in_usual_unit(log, t) for t in ("gyro", "accel", "mag")}
+    signals = Signals(ticks, **triads, time_unit=unit, rate=rate)
     said = {i.quantity: i for i in infer_signals(signals)}
     up = said.get("up_axis")
     if up is not None and up.value is not None:
@@ -91,6 +94,22 @@ def told_by_numbers(log: LogInUse, ticks: NDArray[Any] | None, dated: bool) -> d
         if stated and factor_of(stated[0], {**UNITS["accel"], **SUMS["accel"]}) < 0.0:
             said["up_axis"] = _reversed(up)
     return said
+
+
+def _in_usual_unit(log: LogInUse, triad: str) -> Array | None:
+    """Return the values of a triad; in SI where they are stated in a unit that none infers."""
+    values = log.values.get(triad)
+    if values is None or triad not in UNITS or _usual(log, triad):
+        return values
+    unit, _ = _stated_unit(log, triad) or ("", "")
+    return np.asarray(values * factor_of(unit, UNITS[triad]))
+
+
+def _usual(log: LogInUse, triad: str) -> bool:
+    """Whether the unit of a triad is not stated, or one that numbers alone may show."""
+    stated = _stated_unit(log, triad)
+    rare = UNITS[triad].keys() - {*INFERRED[triad]}
+    return stated is None or stated[0] not in rare
 
 
 def _opposite(axis: str) -> str:
@@ -137,6 +156,9 @@ def units_of_triads(log: LogInUse) -> dict[str, tuple[str, str]]:
             sure = likely is not None and likely.value and likely.confidence >= LIKELY
             unit = str(likely.value) if likely is not None and sure else "UNIT"
             counts = unit_of_counts(likely)
+            if triad == "accel" and code in ("io.unit-unknown-word", "io.unit-not-sure"):
+                log.questions.ask(error.finding, accel_unit=counts or unit)
+                continue
             if triad != "gyro":
                 # Beside a gyro whose unit is asked, that of its accelerometer is asked, too.
                 if triad == "accel" and gyro_asked:
@@ -155,7 +177,98 @@ def units_of_triads(log: LogInUse) -> dict[str, tuple[str, str]]:
     plain = {t: u for t, (u, _) in units.items()}
     _report_contradictions(log, plain, asked)
     _ask_beyond_full_scale(log, plain, asked)
+    if not any(q.quantity == "gyro" for q in log.questions.questions):
+        _report_scale_of_gyro(log, plain["gyro"])
+    if "accel" in plain and not any(q.quantity == "accel" for q in log.questions.questions):
+        _report_scale_of_force(log, plain["accel"])
     return units
+
+
+#: A gyro beyond these of what gravity shows, and a steady force beyond these of gravity, are of
+#: another scale: 3 % and 80 mg are those of consumer sensors (MPU-6050 data sheet, section 6.2); an
+#: arm in step with its rotation adds to the first.
+GYRO_SCALES, FORCE_SCALES = (0.8, 1.25), (0.88, 1.12)
+#: Causes of a scale, by what the right values are relative to those read: powers of two are
+#: sensitivities of other full scales, in deg/s or in g.
+_RANGES = tuple(2.0**k for k in (-5, -4, -3, -2, -1, 1, 2, 3, 4, 5))
+
+
+def _cause(low: float, high: float) -> Finding:
+    """Return what may have made a factor between two bounds, as a note."""
+    for factor in (np.degrees(1.0), np.radians(1.0)):
+        if low < factor < high:
+            return Finding("io.cause-degrees", severity="note", factor=float(factor))
+    factor = next((f for f in _RANGES if low < f < high), None)
+    code = "io.cause-unknown" if factor is None else "io.cause-range"
+    return Finding(code, severity="note", factor=factor)
+
+
+def _report_scale_of_gyro(log: LogInUse, unit: str) -> None:
+    """Warn of a gyro that explains the turning of gravity at another scale alone."""
+    scale = log.said.get("gyro_scale")
+    if scale is None or scale.value is None or unit in SUMS["gyro"]:
+        return
+    # In SI already, where the unit is one that none infers.
+    of_unit = factor_of(unit, GYRO_UNITS) if _usual(log, "gyro") else 1.0
+    said = scale.evidence[0].data
+    factor, low, high = (float(said[k]) / of_unit for k in ("scale", "low", "high"))
+    if low > GYRO_SCALES[1] or high < GYRO_SCALES[0]:
+        log.warn(
+            "io.gyro-scale",
+            "gyro",
+            factor=factor,
+            low=low,
+            high=high,
+            percent=said["percent"],
+            unit=unit,
+            cause=_cause(low, high),
+        )
+
+
+#: Length of a piece that may be steady, s, the largest spread of its norm, the fewest of them, also
+#: as a share of all, and the spread of the middle half of their norms.
+_PIECE, _QUIET, _FEWEST, _OF_ALL, _ALIKE = 0.5, 0.02, 10, 0.1, 0.05
+#: Sizes of a steady force, relative to gravity, that are those of another scale; less is of none.
+_OTHER_SCALES = (0.2, 40.0)
+
+
+def _report_scale_of_force(log: LogInUse, unit: str) -> None:
+    """Warn of an accelerometer whose force, where its size is steady, is not gravity."""
+    rate, gravity = log.said.get("rate"), log.said.get("gravity")
+    removed = gravity is not None and gravity.value == "removed"
+    if rate is None or rate.value is None or removed or unit in SUMS["accel"]:
+        return
+    values = log.values["accel"]
+    size = max(round(_PIECE * float(rate.value)), 5)
+    count = len(values) // size
+    some = 1 + count // 2000
+    pieces = values[: count * size].reshape(count, size, 3)[::some]
+    if len(pieces) < _FEWEST:
+        return
+    norms = np.linalg.norm(pieces, axis=2)
+    norm = norms.mean(axis=1)
+    quiet = np.isfinite(norm) & (norms.std(axis=1) < _QUIET * norm)
+    if quiet.sum() < max(_FEWEST, _OF_ALL * len(pieces)):
+        return
+    low, middle, high = map(float, np.quantile(norm[quiet], (0.25, 0.5, 0.75)))
+    if high - low > _ALIKE * middle:
+        return
+    usual = middle * abs(factor_of(unit, ACCEL_UNITS))
+    of_gravity = usual / STANDARD_GRAVITY
+    if FORCE_SCALES[0] < of_gravity < FORCE_SCALES[1] or not (
+        _OTHER_SCALES[0] < of_gravity < _OTHER_SCALES[1]
+    ):
+        return
+    low, high = FORCE_SCALES[0] / of_gravity, FORCE_SCALES[1] / of_gravity
+    log.warn(
+        "io.force-scale",
+        "accel",
+        size=usual,
+        seconds=float(quiet.sum()) * some * _PIECE,
+        unit=unit,
+        factor=1.0 / of_gravity,
+        cause=_cause(low, high),
+    )
 
 
 def _without_gravity(log: LogInUse) -> bool:
@@ -174,13 +287,25 @@ def _without_gravity(log: LogInUse) -> bool:
 
 
 def _refuse_open(log: LogInUse, triad: str) -> None:
-    """Refuse a unit that the file leaves open: the numbers cannot decide between f and -f."""
+    """Refuse a unit that the file leaves open: the numbers cannot decide between f and -f.
+
+    Refused is also one that the file states in a word which is not known.
+    """
     raw, column = log.raw, log.found[f"{triad}_x"]
     unit = column.unit
     # A clock may be local, too, so that this is a unit of nothing else.
     local = re.search(r"\blocal\b", f"{column.source} {raw.units.get(column.source)}")
     if unit in RELATIVE_FIELDS or (triad == "mag" and unit is None and local):
         raise raw.fault("io.mag-unit-relative", triad, source=column.source)
+    word = next((w for c in log.columns(triad) if (w := stated_word(raw, c.source, triad))), "")
+    if word.lower() in COUNTS:
+        raise DataError(
+            _undecided(triad, log.said.get(f"{triad}_unit"), log.values[triad]).replace(
+                file=raw.name, quantity=triad
+            )
+        )
+    if word:
+        raise raw.fault("io.unit-unknown-word", triad, source=column.source, text=word, triad=triad)
     apple = any(re.sub(r"\W", "", name).lower() in APPLE for name in raw.columns)
     if triad == "accel" and unit is None and apple:
         unit = "-g or g"  # that of CoreMotion, or turned by the application
@@ -428,12 +553,16 @@ def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]
     for triad, unit in units.items():
         other = said.get(f"{triad}_unit")
         form = said.get(f"{triad}_form")
-        if triad in asked or other is None:
+        if triad in asked or other is None or not _usual(log, triad):
             continue
         code, why = "io.contradicts-unit", other
         data: dict[str, Any] = {"file": log.raw.name, "quantity": triad, "triad": triad}
         data["unit"] = unit
-        if triad == "gyro" and not other.settled and (instead := _instead(unit, other)):
+        if (
+            triad == "gyro"
+            and not other.settled
+            and (instead := _instead(unit, other, said.get("gyro_scale")))
+        ):
             fault = Finding("io.contradicts-unit", **data, likely=instead, reason=other.finding())
             log.questions.ask(fault, gyro_unit=instead)
         if not other.settled:
@@ -480,7 +609,7 @@ def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]
     )
 
 
-def _instead(unit: str, inferred: Inference) -> str | None:
+def _instead(unit: str, inferred: Inference, scale: Inference | None = None) -> str | None:
     """Return the most probable unit of a gyro if gravity that stood still excludes the stated one.
 
     The numbers need not settle which of the others it is.
@@ -492,7 +621,12 @@ def _instead(unit: str, inferred: Inference) -> str | None:
         return None
     shares = dict(((inferred.value, inferred.confidence), *inferred.alternatives))
     others = [str(u) for u in shares if u not in (unit, None)]
-    return others[0] if others and shares.get(unit, 0.0) < 1.0 - THRESHOLD else None
+    if not others or shares.get(unit, 0.0) >= 1.0 - THRESHOLD:
+        return None
+    # None of them, where gravity that turned shows a factor that none has.
+    said = scale.evidence[0].data if scale is not None and scale.value is not None else None
+    fits = said is None or said["low"] < GYRO_UNITS[others[0]] < said["high"]
+    return others[0] if fits else "UNIT"
 
 
 # Full scale of most gyros, 2000 deg/s per axis, and seconds beyond it. Bodies that turn so fast are
@@ -507,7 +641,7 @@ def _ask_beyond_full_scale(log: LogInUse, units: dict[str, str], asked: set[str]
     """
     gyro, rate = log.values["gyro"], log.said.get("rate")
     other, unit = log.said.get("gyro_unit"), units.get("gyro", "")
-    if "gyro" in asked or unit not in GYRO_UNITS or other is None or other.settled:
+    if "gyro" in asked or unit not in INFERRED["gyro"] or other is None or other.settled:
         return
     if _instead(unit, other):  # asked already
         return

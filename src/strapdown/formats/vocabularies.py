@@ -234,12 +234,12 @@ NOISE = {
     *("lsb", "rps", "轴", "軸", "축", "ось", "оси"),
 }
 #: Where a sensor is worn or mounted, and its range: they tell sensors apart, not quantities.
-PLACES = {
-    *_words("left right upper lower front rear back center top bottom l r ln wr"),
+PARTS = {
     *_words("head neck chest sternum trunk torso waist hip pelvis sacrum lumbar shoulder arm"),
     *_words("forearm elbow wrist hand thigh femur shank tibia knee calf leg ankle foot shoe"),
-    *_words("belt pocket frame wheel base board cabin dash dashboard"),
+    *_words("belt pocket frame wheel cabin dash dashboard left right"),
 }
+PLACES = PARTS | {*_words("upper lower front rear back center top bottom l r ln wr base board")}
 #: Beginnings of the names of sensor chips, which stand beside the name of the sensor.
 CHIP = re.compile(
     r"(?:lsm|lis|ism|iis|asm|icm|iim|mpu|itg|bm[agimx]|bno|akm?|adxl|adis|fxos|fxas|kx|mxg|hmc|qmc|mmc"
@@ -263,8 +263,8 @@ OTHER_QUANTITY = ABOUT | {
 #: Units that say the sensor of a column whose name is an axis. Those of a field in gauss are also
 #: written for accelerations in g.
 BY_UNIT = {
-    "gyro": set(GYRO_UNITS),
-    "accel": {"m/s2", "g", "mg", "ft/s2"},
+    "gyro": {*GYRO_UNITS} - {"rpm", "rev/s"},  # as well of an engine, and a frequency
+    "accel": {"m/s2", "g", "mg", "ft/s2", "cm/s2", "mm/s2"},
     "mag": {"uT", "nT"},
 }
 
@@ -437,7 +437,9 @@ FIXES = Vocabulary(
             ),
             LENGTHS,
         ),
-        "speed": Quantity(_words("speed sog groundspeed locationspeed speedoverground"), SPEEDS),
+        "speed": Quantity(
+            _words("speed sog gspeed groundspeed locationspeed speedoverground"), SPEEDS
+        ),
         "speed_sd": Quantity(_words("speedaccuracy speedsd sacc locationspeedaccuracy"), SPEEDS),
         "course": Quantity(
             _words(

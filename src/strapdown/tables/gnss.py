@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -28,6 +30,7 @@ from strapdown.tables.checks import (
     source_of,
     values_of,
 )
+from strapdown.units import SPEEDS
 
 Array = NDArray[np.float64]
 
@@ -36,17 +39,30 @@ GNSS = [*GEODETIC, *VELOCITY, *POSITION_SD, *VELOCITY_SD, "quality"]
 # Quality indicators of NMEA 0183 GGA: 0 no fix, 1 autonomous, 2 differential, 3 precise, 4 and 5
 # carrier phase, 6 estimated, 7 and 8 manual and simulated.
 QUALITIES = range(9)
-# A step between fixes defines a speed where it exceeds the position uncertainty by this factor and
-# is faster than a walk.
+# A step between fixes defines a velocity where it exceeds the position uncertainty by this factor
+# and is faster than a standing receiver wanders.
 CLEAR = 5.0
-LEAST_SPEED = 3.0  # m/s
+LEAST_SPEED = 0.5  # m/s
 LEAST_STEPS = 4
-# Relative misfit above which velocities disagree with the positions, and below which another unit
-# or order is taken to be right.
+# Relative misfit above which velocities disagree with the positions, and below which another unit,
+# order or direction is taken to be right; the same of heights, whose errors are larger.
 UNLIKE, ALIKE = 0.3, 0.15
+UNLIKE_DOWN, ALIKE_DOWN, LEAST_CLIMB = 1.0, 0.3, 0.05
+# Share of the steps that are so long where velocities are said to be unlike, with twice the misfit:
+# a few of a receiver that stands are by chance.
+MOST = 0.5
+# Steps of such parts of the fixes are compared, and those from fix to fix: a drive may come back to
+# where it was.
+PARTS = (8, 32, 128)
 
 # Findings about the positions, not the velocities.
-_OF_PLACES = ("tables.places-in-degrees-and-minutes", "tables.places-swapped")
+_OF_PLACES = (
+    "tables.places-in-degrees-and-minutes",
+    "tables.places-in-radians",
+    "tables.places-swapped",
+)
+#: Units that velocities may be in.
+SPEEDS_OF_OTHERS = ("km/h", "kn", "mph", "cm/s", "mm/s")
 
 
 def gnss_table(
@@ -101,8 +117,8 @@ def check_gnss(table: pd.DataFrame) -> None:
 
     DataError: a column is missing, a value is not finite, time does not advance, a latitude is
     beyond 90 deg, a standard deviation is negative or not a number, a quality is unknown, or the
-    velocity disagrees with the positions but would agree in km/h or knots, with north and east
-    exchanged, or with latitude and longitude exchanged.
+    velocity disagrees with the positions but would agree in another unit, with other signs or north
+    and east exchanged, by a course in rad, or with latitude and longitude in rad or exchanged.
     """
     source = source_of(table)
     check_columns(table, GNSS, source)
@@ -117,7 +133,7 @@ def check_gnss(table: pd.DataFrame) -> None:
     quality = values_of(table, ["quality"])[:, 0]
     unknown = ~np.isin(quality, list(QUALITIES))
     refuse_row(unknown, "tables.quality-unknown", source, "quality", quality=quality)
-    _check_velocity_fits(table, source)
+    check_velocity(table)
 
 
 def usable(table: pd.DataFrame, columns: Sequence[str]) -> NDArray[np.bool_]:
@@ -133,51 +149,162 @@ def usable(table: pd.DataFrame, columns: Sequence[str]) -> NDArray[np.bool_]:
     return np.asarray(sound & np.isfinite(values_of(table, columns)).all(axis=1))
 
 
-def _check_velocity_fits(table: pd.DataFrame, source: str | None) -> None:
-    """Refuse velocities that match the positions only in another unit or order."""
+class Fit(NamedTuple):
+    """The reading of velocities that agrees with the positions; empty if none of them does.
+
+    `row`: of the first step that shows it. `speed`, `moved` (m/s): by the table and its positions.
+    """
+
+    name: str
+    row: int
+    speed: float
+    moved: float
+
+
+def fitting(
+    time: Array,
+    sd: Array,
+    readings: Mapping[str, tuple[Array, Array]],
+    limits: tuple[float, float, float] = (UNLIKE, ALIKE, LEAST_SPEED),
+) -> Fit | None:
+    """Find which of several readings of a velocity agrees with the positions.
+
+    Parameters
+    ----------
+    time : ndarray, (n,), s
+    sd : ndarray, (n,), m
+        Standard deviation of each position.
+    readings : mapping of str to (ndarray, ndarray)
+        By name: velocity north and east, (n, 2), m/s, or down, (n, 1); and the geodetic places,
+        (n, 3), deg, deg, m. The first is that of the table.
+    limits : (3,)
+        Relative misfit beyond which the table's own reading is not right, and below which another
+        one is; the least speed that is compared, m/s.
+
+    Returns
+    -------
+    Fit or None
+        None if the positions do not move enough to tell. Another reading has to agree where the
+        table's own does not, in steps longer than `CLEAR` standard deviations.
+    """
+    unlike, alike, slowest = limits
+    (first, (velocity, place)), *others = readings.items()
+    axes = slice(2, 3) if velocity.shape[1] == 1 else slice(0, 2)
+    fit = None
+    for apart in sorted({max(1, len(time) // p) for p in (*PARTS, len(time))}, reverse=True):
+        lasted = (time[apart:] - time[:-apart])[:, None]
+        least = np.maximum(CLEAR * np.maximum(sd[apart:], sd[:-apart]), slowest * lasted[:, 0])
+        moved = place_difference(place[apart:], place[:-apart])[:, axes] / lasted
+        plain = _mean_between(velocity, time, apart)
+        fits: dict[str, tuple[float, int]] = {}
+        for name, (reading, at) in [(first, readings[first]), *others]:
+            way = moved
+            if at is not place:
+                way = place_difference(at[apart:], at[:-apart])[:, axes] / lasted
+            clear = np.linalg.norm(way * lasted, axis=1) > least
+            if clear.sum() < LEAST_STEPS:
+                continue
+            own, row = _misfit(plain[clear], moved[clear]), int(np.argmax(clear))
+            if name == first:
+                speeds = [float(np.linalg.norm(v[row])) for v in (plain, moved)]
+                if own < unlike:
+                    return Fit(first, row, *speeds)
+                if clear.mean() > MOST and own > 2.0 * unlike:
+                    fit = fit or Fit("", row, *speeds)
+            elif own >= unlike:
+                told = _mean_between(reading, time, apart)[clear]
+                fits[name] = _misfit(told, way[clear]), row
+        name = min(fits, key=lambda one: fits[one][0], default="")
+        if name and fits[name][0] < alike:
+            row = fits[name][1]
+            return Fit(name, row, *(float(np.linalg.norm(v[row])) for v in (plain, moved)))
+    return fit
+
+
+def _misfit(told: Array, way: Array) -> float:
+    """Return the median difference of velocities, relative to those by the positions."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = np.linalg.norm(told - way, axis=1) / np.linalg.norm(way, axis=1)
+    return float(np.median(np.where(np.isnan(off), 0.0, off)))
+
+
+def turned(velocity: Array) -> dict[tuple[str, str], Array]:
+    """Return velocities north and east, (n, 2), with other signs and in the other order."""
+    named = {s + n: k * velocity[:, j] for j, n in enumerate(("VN", "VE")) for s, k in _SIGNS}
+    pairs = [(a, b) for a, b in itertools.permutations(named, 2) if a[-1] != b[-1]]
+    return {p: np.column_stack([named[n] for n in p]) for p in pairs if p != ("VN", "VE")}
+
+
+_SIGNS = (("", 1.0), ("-", -1.0))
+
+
+def along_course(speed: Array, course: Array) -> Array:
+    """Return velocities north and east, (n, 2), by speeds in m/s and courses in rad, (n,)."""
+    return np.column_stack([speed * np.cos(course), speed * np.sin(course)])
+
+
+def check_velocity(table: pd.DataFrame) -> Fit | None:
+    """Refuse velocities that match the positions only in another unit, order or direction.
+
+    Returns the reading that agrees, as of `fitting`: its name is empty if the velocities are others
+    than those of the positions, in every reading.
+    """
+    source, time = source_of(table), index_of(table)
+    places, sds = values_of(table, GEODETIC), values_of(table, POSITION_SD)
+    velocities, fit = values_of(table, VELOCITY), None
     good = usable(table, [*POSITION_SD[:2], *VELOCITY_SD[:2]])
-    if good.sum() <= LEAST_STEPS:
-        return
-    time = index_of(table)[good]
-    place, velocity = values_of(table, GEODETIC)[good], values_of(table, VELOCITY)[good, :2]
-    # Steps long enough for a clear displacement; slow motion is not checked.
-    sd = values_of(table, POSITION_SD[:2])[good].max()
-    apart = max(1, len(time) // (2 * LEAST_STEPS))
-    lasted = (time[apart:] - time[:-apart])[:, None]
-    moved = place_difference(place[apart:], place[:-apart])[:, :2]
-    mean = _mean_between(velocity, time, apart)
-    clear = (np.hypot(*moved.T) > CLEAR * sd) & (np.hypot(*moved.T) > LEAST_SPEED * lasted[:, 0])
-    if clear.sum() < LEAST_STEPS:
-        return
-    track, told = (moved / lasted)[clear], mean[clear]
+    if good.sum() > LEAST_STEPS:
+        readings = _readings(velocities[good, :2], places[good])
+        fit = fitting(time[good], sds[good, :2].max(axis=1), readings)
+        if fit is not None and fit.name not in ("", "told"):
+            code, pair = fit.name, fit.name.split(",")
+            north, east = pair if len(pair) == 2 else ("", "")
+            if pair == ["VE", "VN"]:
+                code = "tables.velocity-north-east-exchanged"
+            elif north:
+                code = "tables.velocity-turned"
+            elif code in SPEEDS:
+                code = "tables.velocity-in-other-unit"
+            raise DataError(
+                code,
+                file=source,
+                row=int(np.flatnonzero(good)[fit.row]) + 1,
+                quantity="lat, lon" if code in _OF_PLACES else "VN, VE",
+                speed=fit.speed,
+                moved=fit.moved,
+                north=north,
+                east=east,
+                unit=fit.name,
+                factor=SPEEDS.get(fit.name, 1.0),
+            )
+    good = usable(table, [POSITION_SD[2], VELOCITY_SD[2]])
+    if good.sum() > LEAST_STEPS:
+        at, down = places[good], velocities[good, 2:]
+        limits = (UNLIKE_DOWN, ALIKE_DOWN, LEAST_CLIMB)
+        climb = fitting(time[good], sds[good, 2], {"": (down, at), "up": (-down, at)}, limits)
+        if climb is not None and climb.name == "up":
+            row = int(np.flatnonzero(good)[climb.row]) + 1
+            data = {"speed": climb.speed, "moved": climb.moved}
+            raise DataError("tables.velocity-up", file=source, row=row, quantity="VD", **data)
+    return fit
 
-    def misfit(reading: Array, way: Array = track) -> float:
-        return float(np.median(np.hypot(*(reading - way).T) / np.hypot(*way.T)))
 
-    if misfit(told) < UNLIKE:
-        return
-    kmh, knots = 3.6, 3600.0 / 1852.0
-    readings = {
-        "tables.velocity-in-km-h": misfit(told / kmh),
-        "tables.velocity-in-knots": misfit(told / knots),
-        "tables.velocity-north-east-exchanged": misfit(told[:, ::-1]),
-        "tables.places-in-degrees-and-minutes": misfit(told, track / 0.6),
-    }
+def _readings(velocity: Array, place: Array) -> dict[str, tuple[Array, Array]]:
+    """Return readings of velocities, (n, 2), and places, (n, 3), by the code that says them."""
+    readings = {"told": (velocity, place)}
+    readings |= {unit: (velocity * SPEEDS[unit], place) for unit in SPEEDS_OF_OTHERS}
+    readings |= {",".join(pair): (other, place) for pair, other in turned(velocity).items()}
+    course = np.degrees(np.arctan2(velocity[:, 1], velocity[:, 0]))
+    if np.abs(course).max() < 1.001 * 2.0 * np.pi:  # radians that were taken for degrees
+        speed = np.hypot(*velocity.T)
+        readings["tables.course-in-radians"] = along_course(speed, course), place
+    readings["tables.places-in-degrees-and-minutes"] = 0.6 * velocity, place
+    if (np.abs(place[:, :2]) < [0.5 * np.pi, np.pi]).all():
+        degrees = place * [np.degrees(1.0), np.degrees(1.0), 1.0]
+        readings["tables.places-in-radians"] = velocity, degrees
     if np.abs(place[:, 1]).max() < 90.0:
-        other = place_difference(place[apart:][:, [1, 0, 2]], place[:-apart][:, [1, 0, 2]])[:, :2]
-        readings["tables.places-swapped"] = misfit(told, (other / lasted)[clear])
-    code = min(readings, key=lambda name: readings[name])
-    if readings[code] > ALIKE:
-        return
-    row = int(np.flatnonzero(good)[np.flatnonzero(clear)[0]])
-    raise DataError(
-        code,
-        file=source,
-        row=row + 1,
-        quantity="lat, lon" if code in _OF_PLACES else "VN, VE",
-        speed=np.hypot(*told.T)[0],
-        moved=np.hypot(*track.T)[0],
-    )
+        readings["tables.places-swapped"] = velocity, place[:, [1, 0, 2]]
+    return readings
 
 
 def _mean_between(velocity: Array, time: Array, apart: int) -> Array:

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from strapdown.formats.inference.conclusion import Inference
 from strapdown.formats.inference.infer import Signals
-from strapdown.units import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, TIME_UNITS
+from strapdown.units import ACCEL_UNITS, GYRO_UNITS, INFERRED, MAG_UNITS, TIME_UNITS
 
 GRAVITY = 9.81
 MOTIONS = (
@@ -137,7 +137,7 @@ def make(seed: int) -> tuple[Signals, Truth]:
     name = ",".join(("-" if axes[k, j] < 0 else "") + "xyz"[j] for k, j in enumerate(order))
     gyro = gyro @ axes
     # What is not known to the engine must not be taken for something that is: a tenth in counts.
-    gyro_unit = str(rng.choice([*GYRO_UNITS, "counts"], p=[0.4, 0.35, 0.05, 0.05, 0.05, 0.1]))
+    gyro_unit = str(rng.choice([*INFERRED["gyro"], "counts"], p=[0.4, 0.35, 0.05, 0.05, 0.05, 0.1]))
     gyro_scale = {**GYRO_UNITS, "counts": np.radians(1.0) / 16.4}[gyro_unit]
     accel_unit = str(rng.choice(["m/s2", "g", "mg", "counts"], p=[0.45, 0.35, 0.1, 0.1]))
     accel_scale = {**ACCEL_UNITS, "counts": GRAVITY / 4096.0}[accel_unit]
@@ -146,7 +146,7 @@ def make(seed: int) -> tuple[Signals, Truth]:
     if rng.random() < 0.1 and accel_unit in ("m/s2", "counts"):
         gyro_form = accel_form = "increment"
         gyro, accel = gyro / rate, accel / rate
-    mag_unit = str(rng.choice(list(MAG_UNITS)))
+    mag_unit = str(rng.choice(list(INFERRED["mag"])))
     time_unit = str(rng.choice(["s", "ms", "us", "ns"]))
     stamps, fault = _stamps(rng, time, time_unit)
     if rng.random() < 0.3:

@@ -103,7 +103,7 @@ def test_a_unit_of_something_else_is_refused():
     with pytest.raises(
         ConfigError, check=lambda refused: refused.finding.code == "io.crash-unit-unknown"
     ):
-        state_unit("gee", "acceleration")
+        state_unit("furlong", "acceleration")
 
 
 def test_a_title_above_the_header_and_a_row_of_units(read):

@@ -597,3 +597,67 @@ def test_what_a_refusal_names_is_an_argument_of_read(tmp_path):
         sd.read(path)
     imu = sd.read(path, units={"gyro": "deg/s", "accel": "g"})["imu"]
     assert isinstance(imu, pd.DataFrame) and len(imu) == N
+
+
+# Sensors of parts, parts of a force, and text that was encoded twice.
+
+
+def tabled(tmp_path, names, columns, code="utf-8"):
+    rows = [many(row) for row in np.column_stack(columns)]
+    path = tmp_path / "log.csv"
+    text = "\n".join([line(*names), *(line(*row) for row in rows)]) + "\n"
+    path.write_bytes(text.encode(code))
+    return path
+
+
+def of(sensor, unit=""):
+    return [f"{sensor}_{a}{unit}" for a in "xyz"]
+
+
+@pytest.mark.parametrize("names", [("linear_acceleration", "gravity"), ("lin_acc", "grav")])
+def test_linear_acceleration_and_gravity_are_summed(tmp_path, names):
+    shaken = 0.4 * np.sin(5.0 * T)[:, None] * np.array([1.0, 0.5, -0.2])
+    heads = [*of("gyro", "_rad_s"), *of(names[0], "_m_s2"), *of(names[1], "_m_s2")]
+    path = tabled(tmp_path, ["time_s", *heads], [T, RATE, shaken, FORCE])
+    imu = sd.read_imu(path)
+    check(imu, force=FORCE + shaken)
+    assert "io.force-of-linear-and-gravity" in {f.code for f in imu.findings}
+
+
+def test_an_accelerometer_of_its_own_is_not_summed(tmp_path):
+    heads = [*of("gyro", "_rad_s"), *of("lin_acc", "_m_s2"), *of("grav", "_m_s2")]
+    own = of("accel", "_m_s2")
+    path = tabled(tmp_path, ["time_s", *heads, *own], [T, RATE, 0 * FORCE, 0 * FORCE, FORCE])
+    check(sd.read_imu(path))
+
+
+def test_a_gyro_and_an_accelerometer_of_two_parts_are_asked_about(tmp_path):
+    names = ["time_s", *of("foot_gyro", "_rad_s"), *of("shank_acc", "_m_s2")]
+    path = tabled(tmp_path, names, [T, RATE, FORCE])
+    with pytest.raises(DataError, check=coded("io.sensors-of-different-parts")) as refused:
+        sd.read_imu(path)
+    check(sd.read_imu(path, columns=dict(refused.value.finding.data["answers"])))
+
+
+def test_of_several_parts_the_one_with_both_sensors_is_read(tmp_path):
+    heads = [of("foot_gyro", "_rad_s"), of("shank_gyro", "_rad_s"), of("shank_acc", "_m_s2")]
+    names = ["time_s", *heads[0], *heads[1], *heads[2]]
+    check(sd.read_imu(tabled(tmp_path, names, [T, 2.0 * RATE, RATE, FORCE])))
+
+
+@pytest.mark.parametrize("code", ["cp1251", "cp1252", "latin-1"])
+def test_names_that_were_encoded_twice(tmp_path, code):
+    names = [*of("gyro", " (°/s)"), *of("acc", " (м/с²)" if code == "cp1251" else " (m/s²)")]
+    names += ["Ускорение"] if code == "cp1251" else []
+    twice = [name.encode("utf-8").decode(code) for name in names]
+    more = [0 * T] if code == "cp1251" else []
+    imu = sd.read_imu(tabled(tmp_path, ["time_s", *twice], [T, RATE * DEG, FORCE, *more]))
+    check(imu, digits=2e-4)
+    assert "io.text-decoded-twice" in {f.code for f in imu.findings}
+
+
+def test_right_names_are_not_decoded_again(tmp_path):
+    names = ["time_s", *of("gyro", " (°/s)"), *of("Ускорение", " (м/с²)")]
+    imu = sd.read_imu(tabled(tmp_path, names, [T, RATE * DEG, FORCE]))
+    check(imu, digits=2e-4)
+    assert "io.text-decoded-twice" not in {f.code for f in imu.findings}

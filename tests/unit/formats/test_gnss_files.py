@@ -81,7 +81,8 @@ def test_the_table_itself_by_text_and_parquet(tmp_path):
     ],
 )
 def test_names_and_units(tmp_path, head, factors):
-    numbers = [1000.0, 0.7, 0.2, 1.5, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0]
+    place = (0.7, 0.2) if "lat" in factors else (47.0, 8.0)
+    numbers = [1000.0, *place, 1.5, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0]
     names = ["time", *GNSS[:-1]]
     table = table_of(tmp_path, head, [",".join(map(str, numbers))])
     got = table.reset_index().iloc[0]

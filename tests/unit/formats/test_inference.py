@@ -27,6 +27,7 @@ from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.inference.rotation_rate import signed_permutations, turns
 from strapdown.formats.recording import ReadOptions
 from strapdown.tables import ACCEL, GYRO, MAG
+from strapdown.units import GYRO_UNITS
 
 # The package has a function of this name.
 infer_module = importlib.import_module("strapdown.formats.inference.infer")
@@ -590,3 +591,21 @@ def test_an_arm_is_seen_in_the_parts_of_a_long_log():
     across = infer_module.fit_arm(1 / rate, w[rows], force[rows])
     assert arm.alone > infer_module.ARM_ALONE
     assert arm.alone > across.alone
+
+
+def test_the_scale_of_a_gyro_by_gravity_contains_the_truth():
+    """Hands and arms in any unit and any axes: 95 % intervals, none far from the truth."""
+    known = {**GYRO_UNITS, None: np.radians(1.0) / 16.4}
+    held, count = 0, 0
+    for seed in range(250):
+        signals, truth = make(seed)
+        said = {i.quantity: i for i in infer_signals(signals)}.get("gyro_scale")
+        usual = (truth.gravity, truth.gyro_form, truth.time_unit) == ("present", "rate", "s")
+        if said is None or said.value is None or not usual:
+            continue
+        data, scale = said.evidence[0].data, known[truth.gyro_unit]
+        assert data["low"] < 1.25 * scale and data["high"] > 0.8 * scale
+        held += data["low"] < scale < data["high"]
+        count += 1
+    # Of so many, 95 % less two standard deviations.
+    assert count > 10 and held > count * (0.95 - 2.0 * np.sqrt(0.95 * 0.05 / count))

@@ -14,6 +14,7 @@ from tests.coded import coded
 
 import strapdown as sd
 from strapdown.errors import ConfigError, DataError
+from strapdown.formats.clocks import GPS
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.frames import ecef_from_geodetic, geodetic_from_ned
 from strapdown.tables.checks import HEIGHTS_AS_STATED
@@ -277,3 +278,162 @@ def test_a_form_that_cannot_be_read(run_cli, drive):
     for flag, text in (("--gnss-origin", "1,2"), ("--gnss-columns", "lat"), ("--gnss-units", "x=")):
         done = run_cli(*base, flag, text)
         assert done.code == 4 and flag in done.err
+
+
+# Courses, and coordinates, whose unit or sense the file does not state.
+
+_T = np.arange(300) * 0.5
+_TURN = 0.4 + 0.9 * np.sin(_T / 11) + _T / 24
+_SPEED = 12.0 + 5.0 * np.sin(_T / 7)
+
+
+def wound(tmp_path, **columns):
+    """A winding drive without noise, with further columns."""
+    v = np.column_stack([_SPEED * np.cos(_TURN), _SPEED * np.sin(_TURN), 0 * _T])
+    way = np.vstack([np.zeros(3), np.cumsum(0.25 * (v[1:] + v[:-1]), axis=0)])
+    lat, lon, alt = geodetic_from_ned(way, (48.1, 11.5, 500.0)).T
+    path = tmp_path / "fixes.csv"
+    return written(path, {"time": _T, "lat": lat, "lon": lon, "alt": alt, **columns}), v
+
+
+def read_course(path, **units):
+    return sd.read_gnss(path, units=units, position_sd_m=1.0, velocity_sd_m_per_s=0.1)
+
+
+DEGREES = np.degrees(_TURN) % 360.0
+
+
+@pytest.mark.parametrize(
+    ("course", "factor", "units"),
+    [
+        (DEGREES, 1.0, {}),
+        ((DEGREES + 180.0) % 360.0 - 180.0, 1.0, {}),
+        (np.radians(DEGREES), 1.0, {"course": "rad"}),
+        (np.radians((DEGREES + 180.0) % 360.0 - 180.0), 1.0, {"course": "rad"}),
+        (np.round(100 * DEGREES), 1.0, {"course": "cdeg"}),
+        (np.round(1e5 * DEGREES), 1.0, {"course": "1e-5 deg"}),
+        (360.0 - DEGREES, 1.0, {"course": "-deg"}),
+        ((DEGREES + 180.0) % 360.0, 1.0, {"speed": "-m/s"}),
+        (np.radians(DEGREES), 3.6, {"speed": "km/h", "course": "rad"}),
+    ],
+)
+def test_a_course_without_a_unit_is_held_against_the_positions(tmp_path, course, factor, units):
+    path, v = wound(tmp_path, speed=factor * _SPEED, course=course)
+    if units:
+        with pytest.raises(DataError) as refused:
+            read_course(path)
+        assert refused.value.finding.data["python"] == str(units).replace("'", '"')
+    fixes = read_course(path, **units)
+    # The course is rounded to 0.01 deg: 1.5 mm/s of 17 m/s.
+    np.testing.assert_allclose(fixes[["VN", "VE"]], v[:, :2], atol=2e-3)
+
+
+def test_a_course_from_east_is_told(tmp_path):
+    path, _ = wound(tmp_path, speed=_SPEED, course=(90.0 - DEGREES) % 360.0)
+    with pytest.raises(DataError, check=coded("io.course-from-east")):
+        read_course(path)
+
+
+def test_a_course_beyond_a_turn_is_asked_about_where_nothing_moves(tmp_path):
+    path = written(tmp_path / "a.csv", geodetic(speed=0.1 + 0 * _T, course=9000.0 + 10 * _T))
+    with pytest.raises(DataError, check=coded("io.course-beyond-turn")):
+        read_course(path)
+
+
+def test_a_velocity_up_is_stated_with_a_minus(tmp_path):
+    north, east = _SPEED * np.cos(_TURN), _SPEED * np.sin(_TURN)
+    path, _ = wound(tmp_path, VN=north, VE=east, VD=0 * _T + 1.0)
+    np.testing.assert_array_equal(read_course(path, VD="-m/s")["VD"], -1.0)
+
+
+def test_velocities_of_nothing_are_warned_of(tmp_path):
+    path, _ = wound(tmp_path, VN=_SPEED, VE=0.0 * _T, VD=0.0 * _T)
+    codes = [f.code for f in read_course(path).findings]
+    assert "io.velocity-unlike-positions" in codes
+
+
+def test_coordinates_that_may_be_radians_are_asked_about(tmp_path):
+    """Degrees and radians are both on the Earth; the unit in a name answers it."""
+    path, _ = wound(tmp_path)
+    table = pd.read_csv(path)
+    radians = table.assign(lat=np.radians(table.lat), lon=np.radians(table.lon))
+    radians.to_csv(path, index=False)
+    with pytest.raises(DataError, check=coded("io.degrees-or-radians")):
+        read_course(path)
+    fixes = read_course(path, lat="rad", lon="rad")
+    np.testing.assert_allclose(fixes[["lat", "lon"]], table[["lat", "lon"]], atol=1e-9)
+    assert read_course(path, lat="deg", lon="deg")["lat"].max() < 1.0
+    radians.rename(columns={"lat": "lat_rad", "lon": "lon_rad"}).to_csv(path, index=False)
+    np.testing.assert_allclose(read_course(path)[["lat", "lon"]], table[["lat", "lon"]], atol=1e-9)
+
+
+# Whole numbers of u-blox: UBX-NAV-PVT, Interface Description.
+
+
+def nav_pvt():
+    """A drive as NAV-PVT has it, and its positions and velocities."""
+    north, east = _SPEED * np.cos(_TURN), _SPEED * np.sin(_TURN)
+    v = np.column_stack([north, east, 0.2 * np.cos(_T / 30)])
+    way = np.vstack([np.zeros(3), np.cumsum(0.25 * (v[1:] + v[:-1]), axis=0)])
+    place = geodetic_from_ned(way, (48.1, 11.5, 6.0))  # 6 m: 6000 may be a height in m, too
+    whole = {
+        "iTOW": 302_400_000 + 500 * np.arange(len(_T)),
+        **dict(zip(("lat", "lon"), np.rint(place[:, :2].T * 1e7), strict=True)),
+        "height": np.rint(place[:, 2] * 1e3),
+        "hAcc": 1500 + 0 * _T,
+        "vAcc": 2300 + 0 * _T,
+        **dict(zip(("velN", "velE", "velD"), np.rint(v.T * 1e3), strict=True)),
+        "gSpeed": np.rint(1e3 * _SPEED),
+        "headMot": np.rint(1e5 * DEGREES),
+        "sAcc": 150 + 0 * _T,
+    }
+    return {name: np.asarray(values).astype(np.int64) for name, values in whole.items()}, place, v
+
+
+SCALED = {"lat": 1e-7, "lon": 1e-7, "headMot": 1e-5}
+
+
+@pytest.mark.parametrize("without", [(), ("velN", "velE", "velD")])
+@pytest.mark.parametrize("scaled", [(), ("lat", "lon", "headMot")])
+@pytest.mark.parametrize("parts", [False, True])
+def test_whole_numbers_of_u_blox(tmp_path, without, scaled, parts):
+    """As they are, and as programs scale some of them, beside the parts of a date."""
+    whole, place, v = nav_pvt()
+    table = pd.DataFrame({n: c * SCALED[n] if n in scaled else c for n, c in whole.items()})
+    table = table.drop(columns=[*without])
+    if parts:
+        table = table.assign(year=2024, min=3, sec=5, valid=55)
+    table.to_csv(tmp_path / "pvt.csv", index=False)
+    fixes = sd.read_gnss(tmp_path / "pvt.csv")
+    assert "io.units-of-ublox" in {f.code for f in fixes.findings}
+    assert fixes.attrs["clock"] == GPS
+    np.testing.assert_allclose(fixes.index, 302_400.0 + _T, atol=1e-9)
+    np.testing.assert_allclose(fixes[["lat", "lon"]], place[:, :2], atol=0.51e-7)
+    np.testing.assert_allclose(fixes["alt"], place[:, 2], atol=0.51e-3)
+    np.testing.assert_allclose(fixes[["VN", "VE"]], v[:, :2], atol=2e-3)
+    assert fixes["down_sd"].unique() == pytest.approx([2.3])
+    assert fixes["north_sd"].unique() == pytest.approx([1.5 / 1.5096], rel=1e-4)
+    assert fixes["VN_sd"].unique() == pytest.approx([0.15])
+
+
+def test_meters_under_these_names_stay_meters(tmp_path):
+    whole, _, v = nav_pvt()
+    table = pd.DataFrame(whole).assign(height=6.25, hAcc=2, vAcc=3, sAcc=0.2, gSpeed=_SPEED)
+    table = table.assign(velN=v[:, 0], velE=v[:, 1], velD=v[:, 2])
+    table.assign(lat=table.lat * 1e-7, lon=table.lon * 1e-7).to_csv(tmp_path / "a.csv", index=False)
+    fixes = sd.read_gnss(tmp_path / "a.csv")
+    assert fixes["alt"].unique() == [6.25] and fixes["down_sd"].unique() == [3.0]
+    np.testing.assert_allclose(fixes[["VN", "VE", "VD"]], v, atol=1e-9)
+
+
+def test_whole_accuracies_beside_whole_coordinates_are_asked_about(tmp_path):
+    whole, _, _ = nav_pvt()
+    names = {"iTOW": "time_ms", "height": "alt_mm", "hAcc": "accuracy", "vAcc": "vertical_accuracy"}
+    table = pd.DataFrame(whole).rename(columns=names)[["lat", "lon", *names.values()]]
+    table.to_csv(tmp_path / "a.csv", index=False)
+    with pytest.raises(DataError, check=coded("io.accuracy-unit-open")):
+        sd.read_gnss(tmp_path / "a.csv")
+    units = {"horizontal_accuracy": "mm", "vertical_accuracy": "mm"}
+    assert sd.read_gnss(tmp_path / "a.csv", units=units)["down_sd"].unique() == pytest.approx([2.3])
+    units = {"horizontal_accuracy": "m", "vertical_accuracy": "m"}
+    assert sd.read_gnss(tmp_path / "a.csv", units=units)["down_sd"].unique() == [2300.0]

@@ -11,6 +11,7 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_log
 from strapdown.formats.columns import read_name
 from strapdown.formats.recording import ReadOptions
+from strapdown.formats.triad_units import _cause
 from strapdown.tables import ACCEL, GYRO
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, factor_of, parse_unit, unit_of
 
@@ -179,3 +180,138 @@ def test_attitude_beside_other_axes_is_no_truth(tmp_path):
         log = read_log(tmp_path / "log.csv")
         assert (log.truth is not None) == used
         assert ("io.attitude-not-used" in {f.code for f in log.findings}) != used
+
+
+# Units of the field in a heading: each factor is by its definition.
+
+_GRAVITY = 9.80665
+OF_FORCE = {
+    **dict.fromkeys(("cm/s²", "cm/s^2", "Gal"), 1e-2),
+    "mm/s²": 1e-3,
+    "ft/s²": 0.3048,
+    "in/s²": 0.0254,
+    "km/h/s": 1.0 / 3.6,
+    "N/kg": 1.0,
+    "mg": 1e-3 * _GRAVITY,
+    "µg": 1e-6 * _GRAVITY,
+    "gee": _GRAVITY,
+    "mGal": 1e-5,
+}
+OF_RATE = {
+    **dict.fromkeys(("rpm", "tr/min", "U/min", "r/min"), np.pi / 30.0),
+    **dict.fromkeys(("rev/s", "rps", "turns/s"), 2.0 * np.pi),
+    "deg/min": np.pi / 180.0 / 60.0,
+    "°/h": np.pi / 180.0 / 3600.0,
+    "rad/min": 1.0 / 60.0,
+    "mrad/s": 1e-3,
+    "µrad/s": 1e-6,
+    "mdps": np.pi / 180e3,
+    "gon/s": np.pi / 200.0,
+    "arcsec/s": np.pi / 180.0 / 3600.0,
+}
+
+
+def tumbling(tmp_path, rate_unit, force_unit, rate, force, form):
+    """A tumble of 20 s, in these units; the rates in rad/s and the forces in m/s² that it has."""
+    t = 0.01 * np.arange(2000)
+    angles = np.column_stack([0.7 * t, 0.5 * np.sin(0.8 * t), 0.6 * np.sin(1.3 * t)])
+    turn = Rotation.from_euler("zyx", angles)
+    w = np.vstack([(turn[:-1].inv() * turn[1:]).as_rotvec() / 0.01, np.zeros(3)])
+    f = turn.inv().apply([0.0, 0.0, _GRAVITY])
+    units = {"gyro": rate_unit, "acc": force_unit}
+    names = ["time_s", *(form.format(f"{s}_{a}", u) for s, u in units.items() for a in "xyz")]
+    rows = [",".join(names)]
+    if form == "{}":
+        rows += [",".join(["s", *[rate_unit] * 3, *[force_unit] * 3])]
+    table = np.column_stack([t, w / rate, f / force])
+    rows += [",".join(f"{v:.12g}" for v in row) for row in table]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return path, w, f
+
+
+UNITS_OF_BOTH = [*((u, "m/s²") for u in OF_RATE), *(("rad/s", u) for u in OF_FORCE)]
+
+
+@pytest.mark.parametrize("form", ["{} ({})", "{}[{}]", "{}"])
+@pytest.mark.parametrize(("rate_unit", "force_unit"), UNITS_OF_BOTH)
+def test_units_of_the_field(tmp_path, rate_unit, force_unit, form):
+    factors = OF_RATE.get(rate_unit, 1.0), OF_FORCE.get(force_unit, 1.0)
+    path, w, f = tumbling(tmp_path, rate_unit, force_unit, *factors, form)
+    imu = read_log(path).imu
+    np.testing.assert_allclose(imu[GYRO], w, atol=1e-9)
+    np.testing.assert_allclose(imu[ACCEL], f, atol=1e-9)
+
+
+@pytest.mark.parametrize("form", ["{} ({})", "{}[{}]", "{}"])
+@pytest.mark.parametrize(("rate_unit", "force_unit"), [("foo/s", "m/s²"), ("rad/s", "bar")])
+def test_a_word_that_is_no_unit_of_the_sensor_is_asked_about(tmp_path, rate_unit, force_unit, form):
+    """The numbers are in rad/s and m/s², and alone would be taken so."""
+    path, w, f = tumbling(tmp_path, rate_unit, force_unit, 1.0, 1.0, form)
+    with pytest.raises(DataError, check=coded("io.unit-unknown-word")) as refused:
+        read_log(path)
+    triad, word, unit = ("gyro", rate_unit, "rad/s")
+    if rate_unit == "rad/s":
+        triad, word, unit = ("accel", force_unit, "m/s2")
+    assert refused.value.finding.data["text"] == word
+    assert dict(refused.value.finding.data["answers"]) == {f"{triad}_unit": unit}
+    imu = read_log(path, ReadOptions(**{f"{triad}_unit": unit})).imu
+    np.testing.assert_allclose(imu[[*GYRO, *ACCEL]], np.column_stack([w, f]), atol=1e-9)
+
+
+@pytest.mark.parametrize("word", ["calibrated", "filtered", "IMU1", "Sensor 2"])
+def test_words_that_say_no_unit_are_no_question(tmp_path, word):
+    path, w, _ = tumbling(tmp_path, word, "m/s²", 1.0, 1.0, "{} ({})")
+    np.testing.assert_allclose(read_log(path).imu[GYRO], w, atol=1e-9)
+
+
+# Scales that the numbers show beside a stated unit.
+
+
+@pytest.mark.parametrize(
+    ("off", "cause"),
+    [
+        (1.0, None),
+        (0.9, None),
+        (0.5, "io.cause-range"),
+        (2.0, "io.cause-range"),
+        (4.0, "io.cause-range"),
+        (1.5, "io.cause-unknown"),
+    ],
+)
+def test_a_gyro_at_another_scale_than_gravity_shows(tmp_path, off, cause):
+    """Numbers that are `off` times those of the stated unit."""
+    path, w, _ = tumbling(tmp_path, "deg/s", "m/s²", np.radians(1.0) / off, 1.0, "{} ({})")
+    read = read_log(path)
+    np.testing.assert_allclose(read.imu[GYRO], off * w, atol=1e-6)
+    said = [f for f in read.findings if f.code == "io.gyro-scale"]
+    assert len(said) == (cause is not None)
+    for one in said:
+        assert one.data["low"] < 1.0 / off < one.data["high"]
+        assert one.data["factor"] * off == pytest.approx(1.0, abs=0.02)
+        assert one.data["cause"].code == cause
+
+
+@pytest.mark.parametrize(
+    ("off", "cause"), [(1.0, None), (0.9, None), (1.1, None), (0.5, "range"), (1.25, "unknown")]
+)
+@pytest.mark.parametrize("turns", [True, False])
+def test_a_steady_force_that_is_not_gravity(tmp_path, off, cause, turns):
+    path, _, _ = tumbling(tmp_path, "rad/s", "m/s²", 1.0, 1.0 / off, "{} ({})")
+    if not turns:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        rows = [line.split(",", 1)[0] + ",0.01,0,0,0,0.1," + repr(off * 9.8) for line in lines[1:]]
+        path.write_text("\n".join([lines[0], *rows]), encoding="utf-8")
+    said = [f for f in read_log(path).findings if f.code == "io.force-scale"]
+    assert [one.data["cause"].code for one in said] == ([f"io.cause-{cause}"] if cause else [])
+    for one in said:
+        assert one.data["factor"] == pytest.approx(1.0 / off, rel=1e-3)
+
+
+def test_no_unit_is_proposed_that_the_turning_of_gravity_excludes(tmp_path):
+    """Converted to degrees twice: no unit has that factor."""
+    path, _, _ = tumbling(tmp_path, "deg/s", "m/s²", np.radians(np.radians(1.0)), 1.0, "{} ({})")
+    with pytest.raises(DataError, check=coded("io.contradicts-unit")) as refused:
+        read_log(path)
+    assert dict(refused.value.finding.data["answers"]) == {"gyro_unit": "UNIT"}
+    assert _cause(57.0, 58.0).code == _cause(0.017, 0.018).code == "io.cause-degrees"

@@ -31,7 +31,8 @@ class Inference:
     """Inference of one quantity from the numbers of a log.
 
     `quantity`: ``time_unit``, ``time_faults``, ``rate``, ``accel_unit``, ``gravity``,
-    ``accel_form``, ``gyro_unit``, ``gyro_form``, ``gyro_axes``, ``up_axis``, ``accel_sign``,
+    ``accel_form``, ``gyro_unit``, ``gyro_form``, ``gyro_axes``, ``gyro_scale`` (rad/s per unit),
+    ``up_axis``, ``accel_sign``,
     ``mag_unit``. `value`: the most probable answer; None if no known one fits. `confidence`: its
     probability, 0 to 1. `evidence`: the numbers that it is based on. `alternatives`: the other
     answers with their probabilities, the most probable first. `flag`: the option that answers the

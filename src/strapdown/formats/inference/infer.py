@@ -30,7 +30,7 @@ from strapdown.formats.inference.rotation_rate import infer_gyro
 from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.tables.checks import all_finite
 from strapdown.tables.on_disk import let_go
-from strapdown.units import MAG_UNITS, TIME_UNITS, factor_of, parse_unit
+from strapdown.units import INFERRED, MAG_UNITS, TIME_UNITS, factor_of, parse_unit
 
 Array = NDArray[np.float64]
 # Of a longer log the signals are judged in contiguous parts, spread evenly over it so that rests
@@ -368,8 +368,8 @@ def infer_mag_unit(mag: Array) -> Inference:
     low, high = np.log10(_FIELD)
     height = 1.0 / (high - low + 2.5 * _IRON)
     weights: dict[str | None, float] = {}
-    for unit, factor in MAG_UNITS.items():
-        where = np.log10(usual * factor)
+    for unit in INFERRED["mag"]:
+        where = np.log10(usual * MAG_UNITS[unit])
         off = max(low - where, where - high, 0.0) / _IRON
         weights[unit] = float(np.log(_PRIOR[unit] * height) - 0.5 * off * off)
     weights[None] = float(np.log(_OTHER / _DECADES))

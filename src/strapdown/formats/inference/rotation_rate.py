@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -21,7 +22,7 @@ from strapdown.formats.inference.conclusion import (
     marginal,
     posterior,
 )
-from strapdown.units import GYRO_UNITS, TIME_UNITS, factor_of
+from strapdown.units import GYRO_UNITS, INFERRED, TIME_UNITS, factor_of
 
 Array = NDArray[np.float64]
 
@@ -97,8 +98,8 @@ def infer_gyro(
     time_units: dict[str, float],
     increments: float = _INCREMENTS,
     milli: float = 0.0,
-) -> tuple[Inference, Inference, Inference, dict[str, float]]:
-    """Infer unit, form and axes of a gyro, and update the probabilities of the units of time.
+) -> tuple[Inference, Inference, Inference, Inference, dict[str, float]]:
+    """Infer unit, form, axes and scale of a gyro; update the probabilities of the units of time.
 
     `ticks` ((n,)): increasing stamps from the first, in the log's own unit. `gyro` ((n, 3)): in the
     log's own unit. `force` ((n, 3), or None): accelerometer in units of gravity; None if gravity
@@ -115,10 +116,12 @@ def infer_gyro(
     scales: list[tuple[Turn, float]] = []
     likely = {u: p for u, p in time_units.items() if p > 1e-3} or {"s": 1.0}
     written = _written_step(gyro)
-    steps = {unit: _in_steps(gyro, scale, written) for unit, scale in GYRO_UNITS.items()}
+    usual = {unit: GYRO_UNITS[unit] for unit in INFERRED["gyro"]}
+    steps = {unit: _in_steps(gyro, scale, written) for unit, scale in usual.items()}
     base: dict[tuple[str | None, str, str], float] = {}
     by_scale: dict[float, dict[Hypothesis, float]] = {}
     stood: list[Finding] = []
+    scale_of_all: Scale | None = None
     for tau, share in likely.items():
         factor = factor_of(tau, TIME_UNITS)
         step = Steps.of(ticks).mean * factor
@@ -126,7 +129,7 @@ def infer_gyro(
         for k, count in enumerate(_COUNTS):
             prior = _PRIOR_COUNTS / len(_COUNTS) * (1.0 if whole else _BROKEN_COUNTS)
             candidates[None, f"counts {k}"] = (np.radians(count), prior)
-        for unit, scale in GYRO_UNITS.items():
+        for unit, scale in usual.items():
             prior = milli * _PRIOR_MILLI[unit] + (1.0 - milli) * _PRIOR[unit]
             prior *= _WHOLE[unit] if whole else 1.0
             prior *= 1.0 + steps[unit][1]
@@ -142,6 +145,8 @@ def infer_gyro(
             base[key[0], key[1], tau] = float(np.log(share * prior * (1 - _OTHER)) + magnitude)
         base[None, "other", tau] = float(np.log(share * _OTHER))
         found = turns(ticks * factor, gyro, force) if force is not None else ()
+        if share > 0.5:
+            scale_of_all = scale_by_gravity(found)
         for key, (scale, _) in candidates.items():
             beyond = [(turn.beyond_stillness(scale), turn.half_width) for turn in found]
             beyond = sorted((b for b in beyond if b[0] > STILL_TURN), reverse=True)
@@ -207,7 +212,22 @@ def infer_gyro(
     said_unit = conclude("gyro_unit", marginal(total, 0), told, "--gyro-unit")
     said_form = conclude("gyro_form", marginal(total, 1), told)
     times = {str(k): v for k, v in marginal(total, 3).items()}
-    return said_unit, said_form, conclude("gyro_axes", axes, told, "--columns"), times
+    said_axes = conclude("gyro_axes", axes, told, "--columns")
+    return said_unit, said_form, said_axes, _said_of_scale(scale_of_all), times
+
+
+def _said_of_scale(scale: Scale | None) -> Inference:
+    """Return the factor to rad/s by which a gyro explains the turning of gravity, if one does."""
+    if scale is None:
+        return Inference("gyro_scale", None, 1.0, (evidence("io.evidence-no-turn-of-gravity"),))
+    told = evidence(
+        "io.evidence-scale-by-gravity",
+        scale=scale.factor,
+        low=scale.low,
+        high=scale.high,
+        percent=100.0 * scale.share,
+    )
+    return Inference("gyro_scale", scale.factor, 0.95, (told,))
 
 
 def _in_steps(gyro: Array, scale: float, written: tuple[float, float]) -> tuple[float, float]:
@@ -461,6 +481,63 @@ class Turn:
         log = -0.5 * self.windows * np.log((left + floor) / self._nothing())
         cost = 2.5 * np.log(max(self.windows, 2)) + np.log(8.0 * np.log(10.0) / MODEL_ERROR)
         return float(log - cost)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The factor from a gyro's numbers to rad/s by which it explains how gravity turned.
+
+    `factor` (rad/s per unit), `low`, `high`: its 95 % interval. `axes`: as of
+    `signed_permutations`. `share`: of the turning that is explained, the least of all time scales.
+    """
+
+    factor: float
+    low: float
+    high: float
+    axes: str
+    share: float
+
+
+#: Share of the turning of gravity that one factor and one set of axes must explain, and how far
+#: nine free elements may be beyond it; how near the factors of two time scales have to be, and the
+#: standard deviation that the scale factor of a consumer sensor and the acceleration of the arm on
+#: which it turns leave.
+_EXPLAINED, _FREELY, _AGREES, _SCALE_SD = 0.9, 0.05, 0.1, 0.07
+
+
+def scale_by_gravity(found: Sequence[Turn]) -> Scale | None:
+    """Find the factor of a gyro by the turning of gravity; None where that does not determine it.
+
+    `found`: sums of time scales, of which two at least have to agree.
+    """
+    names, matrices = signed_permutations()
+    m = matrices.reshape(len(names), 9)
+    rows = []
+    for turn in found:
+        if turn.signal < LEAST_TURN:
+            continue
+        whole = turn.gram[9, 9]
+        size = np.maximum(np.einsum("ni,ij,nj->n", m, turn.gram[:9, :9], m), 1e-300)
+        factor = m @ turn.gram[:9, 9] / size
+        share = np.where(factor > 0.0, factor**2 * size / whole, 0.0)
+        best = 0 if share[0] > share.max() - 0.02 else int(np.argmax(share))
+        _, left = turn.free()
+        if share[best] < _EXPLAINED or 1.0 - left / whole > share[best] + _FREELY:
+            continue
+        # Six rows of a window overlap with those of the next by half.
+        spread = 2.0 * whole * (1.0 - share[best]) / (6 * turn.windows) / size[best]
+        rows.append((best, float(factor[best]), float(np.sqrt(spread)), float(share[best])))
+    if len(rows) < LEAST_SCALES or len({best for best, *_ in rows}) > 1:
+        return None
+    factors, sds = np.array([f for _, f, _, _ in rows]), np.array([sd for _, _, sd, _ in rows])
+    if factors.max() > (1.0 + _AGREES) * factors.min():
+        return None
+    weights = 1.0 / np.maximum(sds, 1e-6 * factors) ** 2
+    mean = float(weights @ factors / weights.sum())
+    # The windows of all time scales are of one motion: the least deviation of one of them.
+    sd = float(np.sqrt(sds.min() ** 2 + np.var(factors) + (_SCALE_SD * mean) ** 2))
+    explained = min(one for *_, one in rows)
+    return Scale(mean, mean - 1.96 * sd, mean + 1.96 * sd, names[rows[0][0]], explained)
 
 
 def turns(time: Array, gyro: Array, force: Array) -> tuple[Turn, ...]:

@@ -343,15 +343,11 @@ def _refuse_units(table: pd.DataFrame, time: Array, placed: Flags, source: str |
     if clear.sum() < LEAST_STEPS:
         return
     ratio = float(np.median(speed[clear] / told[clear]))
-    row = int(rows[np.flatnonzero(clear)[0]]) + 1
-    # Radians taken as degrees are near the equator, where a degree of longitude is longer.
-    small = bool((np.abs(place[:, :2]) <= [0.5 * np.pi, np.pi]).all())
-    for fits, code in (
-        (small and 0.016 < ratio < 0.1, "navigation.fixes-in-radians"),
-        (55.0 < ratio < 65.0, "navigation.fixes-in-minutes"),
-    ):
-        if fits:
-            raise DataError(code, file=source, row=row, quantity="lat, lon", ratio=ratio)
+    if 55.0 < ratio < 65.0:
+        row = int(rows[np.flatnonzero(clear)[0]]) + 1
+        raise DataError(
+            "navigation.fixes-in-minutes", file=source, row=row, quantity="lat, lon", ratio=ratio
+        )
 
 
 def _certain(table: pd.DataFrame, source: str | None) -> list[Finding]:
