@@ -685,11 +685,14 @@ _VALUE_NAMES = ("value", "val", "values", "reading", "data", "wert", "valor")
 
 
 def _without_units(held: dict[str, NDArray[Any]], units: dict[str, str]) -> dict[str, NDArray[Any]]:
-    """Take one unit off all cells of a column, ``0.01 sec``, and put it among the units."""
+    """Take one unit off all cells of a column, ``0.01 sec``, and put it among the units.
+
+    A capital may be the letter of a hemisphere: ``48.5S``.
+    """
     out = dict(held)
     for name, values in held.items():
         first = _WITH_UNIT.fullmatch(str(values[0])) if values.dtype.kind == "O" else None
-        if first is None or unit_of(first[2]) is None:
+        if first is None or first[2] in ("N", "S", "E", "W") or unit_of(first[2]) is None:
             continue
         cells = [_WITH_UNIT.fullmatch(str(v)) for v in values]
         numbers = [float(m[1]) for m in cells if m and m[2] == first[2]]
