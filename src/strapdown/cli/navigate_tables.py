@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from strapdown.cli.console import WORDS, console, print_block, print_findings, print_table
 from strapdown.errors import Finding
-from strapdown.live.replay import Latency
 from strapdown.report.document import MOST_SAID, TableBlock
 from strapdown.report.navigation_document import (
     cautions,
@@ -34,6 +34,9 @@ from strapdown.report.values import (
 from strapdown.report.verdict import terminal_lines
 from strapdown.rotation import within_half_turn
 from strapdown.systems.navigation_run import NavigationRun
+
+if TYPE_CHECKING:
+    from strapdown.live.replay import Latency
 
 #: Most lines of the answer, of which the paths and the seal take the last four.
 LINES, PATHS = 40, 4

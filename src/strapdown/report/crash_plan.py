@@ -62,6 +62,7 @@ class _Plan:
     areas: list[Array]
     moments: list[_Moment]
     reference: Array | None
+    lines: list[Array]
 
 
 def path_plan(
@@ -102,7 +103,7 @@ def path_plan(
         np.ptp(outline.body, axis=0).max()
     )
     width = whole - _LEFT - 8.0 - (_ENLARGED + 62.0 if short else 0.0)
-    points = np.vstack([*plan.areas, *(c.body for c in cars), *_given(plan)])
+    points = np.vstack([*plan.areas, *(c.body for c in cars), *plan.lines])
     tail = np.empty((0, 2))
     for _ in range(3):
         view = PlanView.of(np.vstack([points, tail]), names, (_LEFT, _TOP), width, _HEIGHTS)
@@ -111,7 +112,7 @@ def path_plan(
     beside = None
     if short:
         heights = (view.height, max(view.height, 0.7 * _ENLARGED))
-        near = np.vstack([*plan.areas, *_given(plan)])
+        near = np.vstack([*plan.areas, *plan.lines])
         left = _LEFT + width + 62.0
         beside = PlanView.of(near, names, (left, _TOP), _ENLARGED, heights, 22.0)
         view = replace(view, height=beside.height)
@@ -191,16 +192,13 @@ def _plan(path: CrashPath, events: Sequence[CrashEvent], reference: pd.DataFrame
         colour, dash = (INK, "solid") if k == len(named) - 1 else next(between)
         moments.append(_Moment(name, at, place, heading, colour, dash))
     given = None if reference is None else reference[NED[:2]].to_numpy(dtype=np.float64)
-    return _Plan(path, places, envelope(places, block), moments, given)
+    lines = [places] if given is None else [places, given]
+    return _Plan(path, places, envelope(places, block), moments, given, lines)
 
 
 def _box(points: Array, rim: float = 0.0) -> Box:
     (x0, y0), (x1, y1) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
     return x0 - rim, y0 - rim, x1 + rim, y1 + rim
-
-
-def _given(plan: _Plan) -> list[Array]:
-    return [plan.places] if plan.reference is None else [plan.places, plan.reference]
 
 
 def _entry_arrow(
@@ -423,11 +421,6 @@ class PlanView:
         out.line((x, y), (end, y), INK, 2.0)
         for at in (x, end):
             out.line((at, y - 3.5), (at, y + 3.5), INK, 1.4)
-        words = _length_words(length)
+        size, unit = (1e3, "mm") if length < 0.01 else (1e2, "cm") if length < 1.0 else (1.0, "m")
+        words = f"{number(size * length)} {unit}"
         out.text((0.5 * (x + end), y - 9.0), words, SMALL, INK, anchor="middle", halo=True)
-
-
-def _length_words(length: float) -> str:
-    if length < 0.01:
-        return f"{number(1e3 * length)} mm"
-    return f"{number(100 * length)} cm" if length < 1.0 else f"{number(length)} m"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from strapdown.config.crash_case import TriadSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.case import CaseResult
 from strapdown.crash.case_contact import main_event
-from strapdown.crash.closure import Figure
 from strapdown.crash.delta_v_bound import VelocityChange
 from strapdown.crash.entry import determined
 from strapdown.crash.pdof import AngleInterval, Pdof
@@ -43,6 +43,9 @@ from strapdown.rotation import within_half_turn
 from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.tables import NED
 from strapdown.tables.checks import index_of
+
+if TYPE_CHECKING:
+    from strapdown.crash.closure import Figure
 
 Row = tuple[str, str, str, str]
 ANGLES = ("roll, deg", "pitch, deg", "heading, deg")

@@ -12,7 +12,6 @@ import numpy as np
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.case import CaseResult
 from strapdown.crash.case_contact import OF_DRIVES, main_event
-from strapdown.crash.closure import Closure
 from strapdown.crash.contact import Edge
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import VelocityChange
@@ -49,6 +48,7 @@ from strapdown.sensors.pre_crash import PreparedUnit
 from strapdown.tables import NED, VELOCITY
 
 if TYPE_CHECKING:
+    from strapdown.crash.closure import Closure
     from strapdown.report.document import KeyFigure
 
 TYPES = {

@@ -23,7 +23,6 @@ from strapdown.lazy_names import Choices
 from strapdown.navigation.consistency import Inconsistency
 from strapdown.navigation.heading_integrity import REASONS, STATUSES
 from strapdown.navigation.integrity import QUANTITY_REASONS, Repeated
-from strapdown.navigation.outage_test import judge_outages
 from strapdown.navigation.record import NavigationRecord
 from strapdown.progress import Progress
 from strapdown.report.chart import Array
@@ -239,25 +238,7 @@ def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
             }
             for aid, span, bound in evaluation.outages
         ],
-        "gnss_outage_tests": [
-            {
-                "measurement": withheld_aid(result.spec),
-                "from_s": w.result.span.begin,
-                "to_s": w.result.span.end,
-                "largest_horizontal_error_m": w.result.largest,
-                "bound_95_m": w.result.bound_at_largest,
-                "against": w.result.against,
-                "instants": len(w.result.time),
-                "share_inside": float(w.result.inside.mean()),
-                "probability": verdict.probability,
-                "inside": verdict.consistent,
-                "largest_horizontal_error_forward_m": None
-                if w.smoothed is None
-                else w.forward.largest,
-            }
-            for w in result.withheld
-            for verdict in (judge_outages([w.result]),)
-        ],
+        "gnss_outage_tests": _outage_tests(result) if result.withheld else [],
         "modes": [{"mode": s.name, "from_s": s.begin, "to_s": s.end} for s in record.modes],
         "events": [
             {"time_s": e.time, "kind": e.kind, "what": e.finding.what} for e in record.events
@@ -280,6 +261,29 @@ def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
         "findings": [f.plain("file") for f in result.findings],
     }
     return finite(data)
+
+
+def _outage_tests(result: NavigationRun) -> list[dict[str, Any]]:
+    """Return each test by withheld fixes: the error at their end beside its bound."""
+    from strapdown.navigation.outage_test import judge_outages
+
+    return [
+        {
+            "measurement": withheld_aid(result.spec),
+            "from_s": w.result.span.begin,
+            "to_s": w.result.span.end,
+            "largest_horizontal_error_m": w.result.largest,
+            "bound_95_m": w.result.bound_at_largest,
+            "against": w.result.against,
+            "instants": len(w.result.time),
+            "share_inside": float(w.result.inside.mean()),
+            "probability": verdict.probability,
+            "inside": verdict.consistent,
+            "largest_horizontal_error_forward_m": None if w.smoothed is None else w.forward.largest,
+        }
+        for w in result.withheld
+        for verdict in (judge_outages([w.result]),)
+    ]
 
 
 def _method(result: NavigationRun) -> dict[str, Any]:

@@ -23,7 +23,6 @@ from strapdown.navigation.consistency import (
     consistency_of,
 )
 from strapdown.navigation.measurements.measurement import lasting
-from strapdown.navigation.outage_test import judge_outages
 from strapdown.navigation.record import NavigationRecord, Span, innovation_labels
 from strapdown.navigation.truth_comparison import (
     SmootherConsistency,
@@ -84,8 +83,21 @@ class NavigationEvaluation:
 
     @cached_property
     def states(self) -> tuple[ShownStates, ...]:
-        """Sensor and measurement error states of the filter, for display."""
-        return blocks_of(self.run.filtered)
+        """Sensor and measurement error states of the filter, for display, in their order."""
+        out, record = [], self.run.filtered
+        for name, columns in state_groups(record).items():
+            labels = [c.removeprefix(name).lstrip("_") for c in columns]
+            # The unit must suit both the estimates and their standard deviations.
+            sizes = [view_of(table, columns) for table in (record.sensors, record.sensors_sd)]
+            size = max((float(np.nanmax(np.abs(v))) for v in sizes if v.size), default=0.0)
+            let_go_of_all()
+            factor, unit = shown_unit(record.units.get(columns[0], ""), size)
+            aid, dot, own = name.rpartition(".")
+            words = own.replace("_", " ")
+            words = f"{aid}: {words}" if dot else words.replace("accel ", "accelerometer ")
+            slug = name.replace("_", "-").replace(".", "-")
+            out.append(ShownStates(words, slug, tuple(columns), tuple(labels), unit, factor))
+        return tuple(out)
 
     def unobserved(self, block: ShownStates) -> tuple[str, ...]:
         """Labels of the states of a block whose bounds hardly decreased in the run."""
@@ -125,12 +137,6 @@ class NavigationEvaluation:
     def pair(self) -> tuple[HorizontalErrors, ...]:
         """Errors of the run and of the one with the other correction."""
         return paired_errors(self.run)
-
-    @property
-    def all_findings(self) -> tuple[Finding, ...]:
-        """Findings of the run and of its comparison with the truth."""
-        more = () if self.errors is None else self.errors.findings
-        return (*self.run.findings, *more)
 
     def _errors(self, record: NavigationRecord) -> TruthComparison | None:
         truth = self.run.source.truth
@@ -444,24 +450,6 @@ def state_groups(record: NavigationRecord) -> dict[str, list[str]]:
     return groups
 
 
-def blocks_of(record: NavigationRecord) -> tuple[ShownStates, ...]:
-    """Return the blocks of sensor and measurement error states, in their order."""
-    out = []
-    for name, columns in state_groups(record).items():
-        labels = [c.removeprefix(name).lstrip("_") for c in columns]
-        # The unit must suit both the estimates and their standard deviations.
-        sizes = [view_of(table, columns) for table in (record.sensors, record.sensors_sd)]
-        size = max((float(np.nanmax(np.abs(v))) for v in sizes if v.size), default=0.0)
-        let_go_of_all()
-        factor, unit = shown_unit(record.units.get(columns[0], ""), size)
-        aid, dot, own = name.rpartition(".")
-        words = own.replace("_", " ")
-        words = f"{aid}: {words}" if dot else words.replace("accel ", "accelerometer ")
-        slug = name.replace("_", "-").replace(".", "-")
-        out.append(ShownStates(words, slug, tuple(columns), tuple(labels), unit, factor))
-    return tuple(out)
-
-
 def rejected_times(table: pd.DataFrame) -> Array:
     """Times of the epochs with a rejected component in a table of innovations."""
     weights = values_of(table, [f"weight {label}" for label in innovation_labels(table)])
@@ -552,6 +540,8 @@ def _against_known(evaluation: NavigationEvaluation) -> list[Finding]:
         out.append(reason(good, code, component=component, **data))
     tests = [one.result for one in evaluation.run.withheld]
     if tests:
+        from strapdown.navigation.outage_test import judge_outages
+
         verdict = judge_outages(tests)
         worst = tests[verdict.worst]
         code = "navigation.outage-tests"
