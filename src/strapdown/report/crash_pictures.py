@@ -110,14 +110,16 @@ def pdof_dial(
     for d in sorted(directions, key=lambda d: d.main):
         _wedge(out, centre, d)
     _clock(out, centre)
-    scale = _scale(outline, point)
+    # Pixels per meter about the point.
+    reach = np.abs(outline.body - np.asarray(point, np.float64)[:2])
+    scale = _CAR * _RADIUS / max(float(np.hypot(*reach.T).max()), 1e-3)
     origin = np.array(centre)
     # Forward is up the page: a heading of -90 deg in axes x right, y down.
     there = outline.placed((0.0, 0.0), -90.0, point)
     pixels = there.mapped(lambda points: origin + scale * points)
     draw_outline(out, pixels, _BODY, 1.4, fill="#e9edf2")
     for d in sorted(directions, key=lambda d: d.main):
-        _arrow(out, centre, outline, point, d)
+        _arrow(out, centre, scale * outline.edge(point, d.horizontal_deg), d)
     _recorders(out, centre, [(d, d.horizontal_deg, d.interval) for d in recorders])
     out.circle(centre, 3.6, "#ffffff", 1.0, fill=INK)
     at = 2.0 * _TOP + 2.0
@@ -421,18 +423,10 @@ def _clock(out: Drawing, centre: Point) -> None:
         out.text(place, label, SMALL, _SOFT, anchor=anchor)
 
 
-def _scale(outline: Outline, point: Sequence[float]) -> float:
-    """Pixels per meter about the point."""
-    reach = np.abs(outline.body - np.asarray(point, np.float64)[:2])
-    return _CAR * _RADIUS / max(float(np.hypot(*reach.T).max()), 1e-3)
-
-
-def _arrow(
-    out: Drawing, centre: Point, outline: Outline, point: Sequence[float], d: Direction
-) -> None:
+def _arrow(out: Drawing, centre: Point, edge: float, d: Direction) -> None:
+    """Draw a force to the vehicle's `edge`, pixels from the center."""
     if not math.isfinite(d.horizontal_deg):
         return
-    edge = _scale(outline, point) * outline.edge(point, d.horizontal_deg)
     tip = min(edge + 3.0, 0.60 * _RADIUS)
     tail = (_RING - 0.01) * _RADIUS
     unsure = d.interval is not None and d.interval.undetermined

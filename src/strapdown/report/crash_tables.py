@@ -19,7 +19,6 @@ from strapdown.report.crash_words import DEG, DRIVE_QUANTITIES
 from strapdown.report.document import TableBlock, table_of
 from strapdown.report.values import (
     GAP,
-    MEAN,
     about,
     axis_names,
     component_words,
@@ -42,7 +41,7 @@ from strapdown.report.values import (
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.tables import NED
-from strapdown.tables.checks import index_of
+from strapdown.tables.checks import Array, index_of
 
 if TYPE_CHECKING:
     from strapdown.crash.closure import Figure
@@ -66,7 +65,7 @@ def answers_table(result: CaseResult) -> TableBlock | None:
                 strong.append(len(rows))
             rows.append(
                 (
-                    recorder(unit, result),
+                    recorder(unit.name, result),
                     f"{k + 1}, {kind.name}",
                     f"{plain(whole.delta_v.start, 4)} to {plain(whole.delta_v.end, 4)}",
                     *component_words(whole),
@@ -102,7 +101,7 @@ def direction_table(result: CaseResult) -> TableBlock | None:
                     path = _over_ground(getattr(ned, window), ground)
                 rows.append(
                     (
-                        recorder(unit, result),
+                        recorder(unit.name, result),
                         f"{k + 1}, {'contact' if window == 'event' else 'largest'}"
                         + (", recorded part" if change.at_least else ""),
                         f"{plain(angle.horizontal_deg, 1)}°" if known else "not determined",
@@ -157,7 +156,7 @@ def path_table(result: CaseResult) -> TableBlock | None:
             table["heading"] = float(within_half_turn(table["heading"]))
         rows.append(
             (
-                recorder(unit, result),
+                recorder(unit.name, result),
                 instant(unit.path.time[-1]),
                 *(
                     about(size * float(table[a]), size * TWO_SIDED_95 * float(sd[a]), "")
@@ -186,18 +185,18 @@ def budget_table(result: CaseResult) -> TableBlock | None:
     changes = None if number is None else unit.body[number].event.bound.by_contributor
     if changes is not None:
         names += [n for n in changes.index if n not in names]
-    rows: list[tuple[float, tuple[str, ...]]] = []
-    sums = np.zeros(5)
+    variances: dict[str, Array] = {}
     for name in names:
         squares = np.zeros(5)
         if changes is not None and name in changes.index:
             squares[0], squares[1] = (float(changes.loc[name, c]) for c in ("xx", "yy"))
         if name in ends.index:
             squares[2:] = ends.loc[name].to_numpy(dtype=np.float64)
-        sums += squares
-        sizes = np.sqrt(squares)
-        rows.append((float(squares.sum()), (name, *_sizes(sizes))))
-    rows.sort(key=lambda r: -r[0])
+        variances[name] = squares
+    variances["total"] = np.sum([variances[name] for name in names], axis=0)
+    names.sort(key=lambda name: -float(variances[name].sum()))
+    units = np.repeat([speed_factor(), length_factor()], [2, 3])
+    shown = {name: (np.sqrt(squares) * units).tolist() for name, squares in variances.items()}
     return table_of(
         (
             "contributor",
@@ -205,16 +204,14 @@ def budget_table(result: CaseResult) -> TableBlock | None:
             f"delta-V right, {speed_unit()}",
             *(f"{name} at the end, {length_unit()}" for name in axis_names(result)),
         ),
-        [*(cells for _, cells in rows), ("total", *_sizes(np.sqrt(sums)))],
-        f"{recorder(unit, result)}: one standard deviation; squares add up to that of the "
+        (
+            (name, *("–" if sd < 5e-4 else plain(sd, 3) for sd in shown[name]))
+            for name in (*names, "total")
+        ),
+        f"{recorder(unit.name, result)}: one standard deviation; squares add up to that of the "
         "total. The 95 % bound is 1.96 times it.",
-        strong=(len(rows),),
+        strong=(len(names),),
     )
-
-
-def _sizes(sizes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[str, ...]:
-    scaled = sizes * np.repeat([speed_factor(), length_factor()], [2, 3])
-    return tuple("–" if s < 5e-4 else plain(float(s), 3) for s in scaled)
 
 
 # Comparison with other recorders, injury-risk models and references.
@@ -298,8 +295,8 @@ def deformation_table(result: CaseResult) -> TableBlock | None:
     row, per, per_unit = _figure_row, speed_factor(), speed_unit()
     rows = [
         row(
-            f"crush by {_named(one.unit, result)}, {1e3 * (one.time - one.touch):.0f} ms after the "
-            "first touch",
+            f"crush by {recorder(one.unit, result)}, {1e3 * (one.time - one.touch):.0f} ms "
+            "after the first touch",
             one.depth,
             length_factor(),
             3,
@@ -394,7 +391,7 @@ def indices_table(result: CaseResult) -> TableBlock | None:
             detail.append(f"channels {', '.join(index.channels)}")
         rows.append(
             (
-                _named(index.of, result),
+                recorder(index.of, result),
                 index.name,
                 value,
                 bound,
@@ -438,7 +435,7 @@ def severity_table(result: CaseResult) -> TableBlock | None:
     main = result.reconstruction.main
     kind = main.types[main_event(main) or 0].name
     any_type = not any("crash_type" in answer.model.applies for answer in result.severity)
-    name = _named({answer.of for answer in result.severity}.pop(), result)
+    name = recorder({answer.of for answer in result.severity}.pop(), result)
     return table_of(
         "outcome | probability | 95 % bound | the bound is of" + " | source" * (len(sources) > 1),
         rows,
@@ -458,7 +455,7 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
     paths: list[tuple[str, ...]] = []
     for answer in result.references:
         spec, verdict = answer.spec, "yes" if answer.consistent else "NO"
-        who = (spec.name, _named(answer.unit, result))
+        who = (spec.name, recorder(answer.unit, result))
         if answer.path is not None:
             errors = [length_factor() * v for v in (*answer.path.rms, *answer.path.largest)]
             paths.append((*who, *(plain(float(v), 3) for v in errors), verdict))
@@ -519,11 +516,6 @@ def _force_words(result: CaseResult) -> Iterator[str]:
                     f"measured force, {parts[0]}, and of the mass and the friction of the tires, "
                     f"which the force does not show, {parts[1]}."
                 )
-
-
-def _named(unit: str, result: CaseResult) -> str:
-    combined = result.reconstruction.combined
-    return MEAN if combined is not None and unit == combined.name else unit
 
 
 # Inputs of a crash report: records, recorders, sensors, files.
@@ -617,7 +609,7 @@ def drive_table(result: CaseResult) -> TableBlock | None:
             of_wheels = what["quantity"].startswith("speed")
             rows.append(
                 (
-                    recorder(unit, result),
+                    recorder(unit.name, result),
                     ": ".join((what["of"], name)),
                     about(what["error"] / size, half, symbol),
                     f"± {stated:.2g} {symbol}",

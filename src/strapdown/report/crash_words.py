@@ -12,7 +12,6 @@ import numpy as np
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.case import CaseResult
 from strapdown.crash.case_contact import OF_DRIVES, main_event
-from strapdown.crash.contact import Edge
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import VelocityChange
 from strapdown.crash.measuring_point import MISSING_AXIS, NO_TURNING, TURNED_AXIS
@@ -131,13 +130,16 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
         changes = unit.body[number]
         whole, peak = changes.event, changes.peak
         ms = 1e3 * (peak.delta_v.end - peak.delta_v.start)
+        begin, end = (
+            about(edge.time, TWO_SIDED_95 * edge.sd, "s")
+            for edge in (changes.contact.start, changes.contact.end)
+        )
         figures.append(
             KeyFigure(
                 "Delta-V",
                 change_words(whole),
                 change_range(whole),
-                f"over the contact, {_edge_words(changes.contact.start)} to "
-                f"{_edge_words(changes.contact.end)}; largest in {ms:.3g} ms {change_words(peak)}",
+                f"over the contact, {begin} to {end}; largest in {ms:.3g} ms {change_words(peak)}",
             )
         )
         across = whole.interval.horizontal
@@ -212,11 +214,6 @@ def lead(result: CaseResult) -> str:
         assumption_words(result),
     ]
     return " ".join(p for p in parts if p)
-
-
-def _edge_words(edge: Edge) -> str:
-    """Return onset or end of a contact with its bound."""
-    return about(edge.time, TWO_SIDED_95 * edge.sd, "s")
 
 
 def windows_words(unit: UnitReconstruction, number: int) -> str:
