@@ -24,7 +24,6 @@ from strapdown.report.navigation_evaluation import (
     distance_over_ground,
     trust,
 )
-from strapdown.report.paired_corrections import paired_table
 from strapdown.report.values import (
     duration_words,
     length_words,
@@ -73,23 +72,17 @@ def print_navigation(
     distance = length_words(distance_over_ground(trajectory))
     name = f"{result.source.name}: {result.source.what}"
     out.print(spaced(f"{name}, {duration}, {distance}, {len(time)} samples"))
-    tables: list[TableBlock | None]
+    pair: TableBlock | None = None
+    if evaluation.pair:
+        from strapdown.report.paired_corrections import paired_table
+
+        pair = paired_table(evaluation)
+    seen = pair, point_table(evaluation), observation_table(evaluation)
+    withheld = withheld_table(evaluation)
+    tables: tuple[TableBlock | None, ...] = (_end(evaluation), *seen, withheld)
     if verbose:
-        tables = [
-            end_table(evaluation),
-            error_table(evaluation),
-            paired_table(evaluation),
-            point_table(evaluation),
-        ]
-        tables += [
-            observation_table(evaluation),
-            outage_table(evaluation),
-            withheld_table(evaluation),
-        ]
-        tables += [state_table(evaluation)]
-    else:
-        tables = [_end(evaluation), paired_table(evaluation), point_table(evaluation)]
-        tables += [observation_table(evaluation), withheld_table(evaluation)]
+        ends = end_table(evaluation), error_table(evaluation)
+        tables = (*ends, *seen, outage_table(evaluation), withheld, state_table(evaluation))
     lines = [(verdict.sentence, STYLES[verdict.verdict])]
     lines += [(f"{head}: {said}", "") for head, said in cautions(evaluation, brief=not verbose)]
     lines += terminal_lines(evaluation, brief=not verbose)

@@ -26,7 +26,6 @@ from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof import NedPdof
 from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
-from strapdown.formats.crash_writers import write_mme
 from strapdown.progress import Progress
 from strapdown.report import crash_words
 from strapdown.report.report_bundle import (
@@ -79,6 +78,8 @@ def _write(
         own = file_name(unit.name, made)
         write_table(table_in(system, signals_table(unit)), folder / f"signals-{own}.csv", told)
     if "mme" in formats:
+        from strapdown.formats.crash_writers import write_mme
+
         spec = result.spec
         record = signal_record(spec.title, spec.point.name, answers, spec.options.rate_hz)
         write_mme(folder / "mme", record)

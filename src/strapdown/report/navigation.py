@@ -39,7 +39,6 @@ from strapdown.report.navigation_evaluation import (
     rms,
     trust,
 )
-from strapdown.report.paired_corrections import paired_json, write_paired
 from strapdown.report.report_bundle import (
     ReportBundle,
     alignment_data,
@@ -256,11 +255,17 @@ def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
             "largest_at_s": points.largest_at,
             "turn_deg": points.turn_deg,
         },
-        "paired": paired_json(evaluation),
+        "paired": _paired(evaluation) if evaluation.pair else None,
         "method": _method(result),
         "findings": [f.plain("file") for f in result.findings],
     }
     return finite(data)
+
+
+def _paired(evaluation: NavigationEvaluation) -> dict[str, Any]:
+    from strapdown.report.paired_corrections import paired_json
+
+    return paired_json(evaluation)
 
 
 def _outage_tests(result: NavigationRun) -> list[dict[str, Any]]:
@@ -423,7 +428,10 @@ def write_navigation_files(evaluation: NavigationEvaluation, folder: Path) -> No
         )
         against = {**comments, "against": result.source.truth_name, "sign": "computed minus truth"}
         write_table(errors, folder / "errors.csv", against)
-    write_paired(evaluation, folder, comments)
+    if evaluation.pair:
+        from strapdown.report.paired_corrections import write_paired
+
+        write_paired(evaluation, folder, comments)
 
 
 def _write_states(

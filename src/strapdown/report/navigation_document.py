@@ -39,7 +39,6 @@ from strapdown.report.navigation_evaluation import (
     state_groups,
     trust,
 )
-from strapdown.report.paired_corrections import paired_chart, paired_table
 from strapdown.report.values import (
     GAP,
     NOT_ESTIMATED,
@@ -630,6 +629,11 @@ def navigation_document(evaluation: NavigationEvaluation, name: str) -> Document
         *charts.error_charts(evaluation),
         charts.nees_chart(evaluation),
     )
+    pair: tuple[Block | None, ...] = ()
+    if evaluation.pair:
+        from strapdown.report.paired_corrections import paired_chart, paired_table
+
+        pair = paired_table(evaluation), paired_chart(evaluation)
     compared = () if evaluation.errors is None else evaluation.errors.findings
     findings = (*run.findings, *compared)
     sections = (
@@ -640,8 +644,7 @@ def navigation_document(evaluation: NavigationEvaluation, name: str) -> Document
         section(
             "paired",
             "With two corrections of the estimated errors",
-            paired_table(evaluation),
-            paired_chart(evaluation),
+            *pair,
         ),
         # Errors matter more than the state, where they are known.
         *((errors, states) if errors.blocks else (states,)),

@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -16,8 +17,6 @@ from strapdown.dsp.chi_square import chi_square_exceeded, plane_bound
 from strapdown.dsp.samples import true_runs
 from strapdown.errors import Finding
 from strapdown.estimation.robust import AdaptiveScale
-from strapdown.evaluation.trajectory_differences import trajectory_differences
-from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.consistency import (
     ObservationConsistency,
     consistency_of,
@@ -35,9 +34,12 @@ from strapdown.report.chart import Array
 from strapdown.report.document import Trust, reason
 from strapdown.report.values import shown_unit
 from strapdown.systems.navigation_run import NavigationRun
-from strapdown.tables import EULER, GEODETIC, VELOCITY
+from strapdown.tables import EULER
 from strapdown.tables.checks import index_of, values_of, view_of
 from strapdown.tables.on_disk import let_go, let_go_of_all, parts_of
+
+if TYPE_CHECKING:
+    from strapdown.report.paired_corrections import HorizontalErrors
 
 #: A smaller relative reduction of a bound means that the motion made the state not observable.
 FELL = 0.1
@@ -135,7 +137,11 @@ class NavigationEvaluation:
 
     @cached_property
     def pair(self) -> tuple[HorizontalErrors, ...]:
-        """Errors of the run and of the one with the other correction."""
+        """Errors of the run and of the one with the other correction; empty without a second."""
+        if self.run.beside is None:
+            return ()
+        from strapdown.report.paired_corrections import paired_errors
+
         return paired_errors(self.run)
 
     def _errors(self, record: NavigationRecord) -> TruthComparison | None:
@@ -332,90 +338,6 @@ def _agreement(name: str, table: pd.DataFrame, stated: bool) -> Agreement:
         lasting=ratio * math.sqrt((1.0 + rho) / (1.0 - rho)) if rho > 0.0 else ratio,
         stated=stated,
     )
-
-
-# A record navigated twice, with two corrections of the estimated errors: errors of both.
-
-
-@dataclass(frozen=True, eq=False)
-class HorizontalErrors:
-    """Horizontal errors of one of the two solutions.
-
-    Attributes
-    ----------
-    kind : str
-        Of `DAMPINGS`.
-    time : ndarray, (n,), s
-    velocity, position : ndarray, (n,), m/s and m
-        Lengths of the errors; NaN where the reference has none.
-    velocity_sd, position_sd : ndarray, (n,), m/s and m
-        Stated: root of the sum of both variances.
-    """
-
-    kind: str
-    time: Array
-    velocity: Array
-    position: Array
-    velocity_sd: Array
-    position_sd: Array
-
-
-def reference_words(result: NavigationRun) -> str:
-    """Return what the errors are relative to."""
-    if result.source.truth is not None:
-        return result.source.truth_name or "the truth"
-    return f"the fixes of {name}" if (name := _receiver(result)) else ""
-
-
-def paired_errors(result: NavigationRun) -> tuple[HorizontalErrors, ...]:
-    """Return the errors of the run and of the one beside it; empty without a second or a reference.
-
-    Relative to the truth, or else to the fixes of the first receiver, as in the paper: then the
-    errors contain those of the fixes, and the lever arm of the antenna.
-    """
-    if result.beside is None or not reference_words(result):
-        return ()
-    kinds = (result.spec.damping.kind, str(result.spec.damping.beside))
-    return tuple(
-        _horizontal(result, kind, record)
-        for kind, record in zip(kinds, (result.filtered, result.beside), strict=True)
-    )
-
-
-def _receiver(result: NavigationRun) -> str:
-    """Name of the first measurement with positions."""
-    tables = result.source.tables
-    return next((name for name, one in tables.items() if set(GEODETIC) <= set(one.columns)), "")
-
-
-def _horizontal(result: NavigationRun, kind: str, record: NavigationRecord) -> HorizontalErrors:
-    trajectory = record.trajectory
-    if result.source.truth is not None:
-        apart = trajectory_differences(trajectory, result.source.truth, result.ellipsoid)
-        time = index_of(apart)
-        position = np.hypot(*values_of(apart, ["north", "east"]).T)
-        velocity = np.hypot(*values_of(apart, ["VN", "VE"]).T)
-    else:
-        fixes = result.source.tables[_receiver(result)]
-        time = index_of(fixes)
-        stamps = index_of(trajectory)
-        inside = (time >= stamps[0]) & (time <= stamps[-1])
-        inside &= np.isfinite(values_of(fixes, GEODETIC)).all(axis=1)
-        time, fixes = time[inside], fixes[inside]
-        own = {c: np.interp(time, stamps, trajectory[c]) for c in (*GEODETIC, *VELOCITY[:2])}
-        places = values_of(fixes, GEODETIC)
-        off = [
-            ned_from_geodetic([[own[c][k] for c in GEODETIC]], place)[0]
-            for k, place in enumerate(places)
-        ]
-        position = np.hypot(*np.reshape(off, (-1, 3))[:, :2].T)
-        velocity = np.hypot(*(own[c] - fixes[c].to_numpy() for c in VELOCITY[:2]))
-    marks = index_of(record.sd)
-    stated = [
-        np.interp(time, marks, np.hypot(*values_of(record.sd, columns).T))
-        for columns in (["VN", "VE"], ["north", "east"])
-    ]
-    return HorizontalErrors(kind, time, velocity, position, *stated)
 
 
 @dataclass(frozen=True)
