@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown import __version__
-from strapdown.bundle import names_file, write_json
+from strapdown.bundle import with_paths, write_json
 from strapdown.config.crash_case import CaseSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer, run_cases
@@ -156,7 +156,11 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
             "contradictions": _pairs(crash_words.contradictions(result)),
             "not_shown": _pairs(crash_words.not_shown(result)),
             "findings": [f.plain("file") for f in result.findings],
-            "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
+            # With the names of files instead of their paths.
+            "case": with_paths(
+                result.spec.model_dump(mode="json", exclude_none=True),
+                lambda path: path.replace("\\", "/").rstrip("/").rsplit("/", 1)[-1],
+            ),
         }
     case = found.pop("case")
     return finite({**_labelled(_endings(result.spec.options.units), found), "case": case})
@@ -217,17 +221,6 @@ def table_in(system: str, table: pd.DataFrame, *, back: bool = False) -> pd.Data
     factors = {column: factor for column, (_, factor) in labels.items() if factor != 1.0}
     changed = table.assign(**{column: f * table[column] for column, f in factors.items()})
     return changed.rename(columns={column: name for column, (name, _) in labels.items()})
-
-
-def _named(value: Any, key: str = "") -> Any:
-    """The case specification with file names instead of paths."""
-    if isinstance(value, dict):
-        return {k: _named(v, k) for k, v in value.items()}
-    if isinstance(value, list):
-        return [_named(v, key) for v in value]
-    if names_file(key, value):
-        return str(value).replace("\\", "/").rstrip("/").rsplit("/", 1)[-1]
-    return value
 
 
 def _pairs(rows: Sequence[tuple[str, str]]) -> list[dict[str, str]]:

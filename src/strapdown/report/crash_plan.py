@@ -106,7 +106,7 @@ def path_plan(
     points = np.vstack([*plan.areas, *(c.body for c in cars), *plan.lines])
     tail = np.empty((0, 2))
     for _ in range(3):
-        view = PlanView.of(np.vstack([points, tail]), names, (_LEFT, _TOP), width, _HEIGHTS)
+        view = PlanFrame.of(np.vstack([points, tail]), names, (_LEFT, _TOP), width, _HEIGHTS)
         arrow = _entry_arrow(plan, outline, point, view.scale)
         tail = np.empty((0, 2)) if arrow is None else arrow
     beside = None
@@ -114,7 +114,7 @@ def path_plan(
         heights = (view.height, max(view.height, 0.7 * _ENLARGED))
         near = np.vstack([*plan.areas, *plan.lines])
         left = _LEFT + width + 62.0
-        beside = PlanView.of(near, names, (left, _TOP), _ENLARGED, heights, 22.0)
+        beside = PlanFrame.of(near, names, (left, _TOP), _ENLARGED, heights, 22.0)
         view = replace(view, height=beside.height)
     legend = _legend_rows(plan, reference_name, whole)
     bottom = _TOP + view.height + _UNDER
@@ -217,7 +217,7 @@ def _entry_arrow(
     return np.vstack([tip - ahead * _ARROW / scale, tip])
 
 
-def _draw_band(out: Drawing, view: PlanView, plan: _Plan) -> None:
+def _draw_band(out: Drawing, view: PlanFrame, plan: _Plan) -> None:
     """Draw the outer edge of all areas: first each with its edge, then all insides over it."""
     areas = [view.pixels(area) for area in plan.areas]
     for area in areas:
@@ -226,7 +226,7 @@ def _draw_band(out: Drawing, view: PlanView, plan: _Plan) -> None:
         out.shape(area, _BAND, 0.4, fill=_BAND)
 
 
-def _draw_path(out: Drawing, view: PlanView, plan: _Plan, faint: bool) -> None:
+def _draw_path(out: Drawing, view: PlanFrame, plan: _Plan, faint: bool) -> None:
     if plan.reference is not None:
         out.shape(view.pixels(plan.reference), VERMILLION, 1.6, "dash", closed=False)
     pixels = view.pixels(plan.places)
@@ -299,7 +299,7 @@ _FOOT = 18.0
 
 
 @dataclass(frozen=True)
-class PlanView:
+class PlanFrame:
     """Mapping of a level plane to a picture.
 
     Attributes
@@ -337,7 +337,7 @@ class PlanView:
         width: float,
         heights: tuple[float, float],
         margin: float = 14.0,
-    ) -> PlanView:
+    ) -> PlanFrame:
         """The largest view that contains all points.
 
         Parameters

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -324,22 +324,22 @@ def place_chart(
         ``north east down`` in the axes of the path, m, indexed by time.
     """
     labels = [f"{name}, m" for name in (*names, "down")]
-    panels = _panels(path, NED, labels, _sampled(samples, 6))
-    if reference is not None:
-        at = 1e3 * index_of(reference)
-        for k, column in enumerate(NED):
-            y = reference[column].to_numpy(dtype=np.float64)
-            line = curve(reference_name, at, y, VERMILLION, "dash", 1.6)
-            panels[k] = replace(panels[k], lines=(*panels[k].lines, line))
-    return _chart(
+    chart = _over_time(
         "position",
-        "Position over time",
         f"Position of the reference point, {names[0]}, {names[1]}, down, from that at the entry, "
         "which is exact by definition.",
-        panels,
-        (path, events),
-        samples,
+        (path, events, samples),
+        dict(zip(NED, labels, strict=True)),
+        _sampled(samples, 6),
     )
+    if reference is None:
+        return chart
+    at, panels = 1e3 * index_of(reference), []
+    for panel, column in zip(chart.panels, NED, strict=True):
+        y = reference[column].to_numpy(dtype=np.float64)
+        line = curve(reference_name, at, y, VERMILLION, "dash", 1.6)
+        panels.append(replace(panel, lines=(*panel.lines, line)))
+    return replace(chart, panels=tuple(panels))
 
 
 def velocity_chart(
@@ -351,14 +351,13 @@ def velocity_chart(
 ) -> Chart:
     """Chart the velocity of the reference point over time; parameters as `place_chart`."""
     labels = [f"{name}, m/s" for name in (*names, "down")]
-    return _chart(
+    return _over_time(
         "velocity",
-        "Velocity over time",
         f"Velocity of the reference point over ground, {names[0]}, {names[1]}, down, in axes that "
         "do not turn with the vehicle.",
-        _panels(path, VELOCITY, labels, _sampled(samples, 3)),
-        (path, events),
-        samples,
+        (path, events, samples),
+        dict(zip(VELOCITY, labels, strict=True)),
+        _sampled(samples, 3),
     )
 
 
@@ -369,15 +368,14 @@ def attitude_chart(
     events: Sequence[CrashEvent] = (),
 ) -> Chart:
     """Chart roll, pitch and heading over time; parameters as `place_chart`."""
-    return _chart(
+    return _over_time(
         "attitude",
-        "Attitude over time",
         "Roll (right side down is positive), pitch (nose up) and heading (clockwise from above), "
         "3-2-1 angles of the vehicle against the axes of the path; the heading continues beyond a "
         "full turn.",
-        _panels(path, EULER, [f"{a}, deg" for a in EULER], _sampled_angles(path, samples)),
-        (path, events),
-        samples,
+        (path, events, samples),
+        {a: f"{a}, deg" for a in EULER},
+        _sampled_angles(path, samples),
     )
 
 
@@ -446,45 +444,41 @@ def _sampled_angles(path: CrashPath, samples: PathSamples | None) -> list[Array]
     return list(out)
 
 
-def _panels(
-    path: CrashPath, columns: Sequence[str], labels: Sequence[str], sampled: list[Array] | None
-) -> list[Panel]:
-    time, sd = 1e3 * path.time, path.sd
-    panels = []
-    for k, (column, label) in enumerate(zip(columns, labels, strict=True)):
+def _over_time(
+    slug: str,
+    caption: str,
+    of: tuple[CrashPath, Sequence[CrashEvent], PathSamples | None],
+    labels: Mapping[str, str],
+    sampled: list[Array] | None,
+) -> Chart:
+    """Columns of a path with both bounds.
+
+    `of`: the path, its events and its Monte Carlo samples. `labels`: of the panels, by column;
+    `sampled`: ends of the interval of each by the samples, relative to it.
+    """
+    path, events, samples = of
+    time, panels = 1e3 * path.time, []
+    for k, (column, label) in enumerate(labels.items()):
         y = path.table[column].to_numpy(dtype=np.float64)
         if column == "heading":
             y = np.unwrap(y, period=360.0)
             # A heading of 359.9 deg at the entry is shown as -0.1 deg.
             y = y - 360.0 * np.round(y[path.anchor] / 360.0)
-        half = TWO_SIDED_95 * sd[column].to_numpy(dtype=np.float64)
+        half = TWO_SIDED_95 * path.sd[column].to_numpy(dtype=np.float64)
         lines = [curve("reconstructed", time, y, BLACK, width=1.8)]
         fill = Fill("95 %, linear", time, y - half, y + half, BLUE)
-        if sampled is not None:
-            for edge in sampled[k]:
-                there = np.isfinite(edge)
-                y_there = (y + edge)[there]
-                lines.append(Line("95 %, Monte Carlo", time[there], y_there, ORANGE, "dash", 1.2))
+        for edge in () if sampled is None else sampled[k]:
+            there = np.isfinite(edge)
+            y_there = (y + edge)[there]
+            lines.append(Line("95 %, Monte Carlo", time[there], y_there, ORANGE, "dash", 1.2))
         panels.append(Panel(label, tuple(lines), fills=(fill,), height=0.8, steady=_STEADY))
-    return panels
-
-
-def _chart(
-    slug: str,
-    title: str,
-    caption: str,
-    panels: list[Panel],
-    when: tuple[CrashPath, Sequence[CrashEvent]],
-    samples: PathSamples | None,
-) -> Chart:
-    path, events = when
     named = [(at, name) for name, at in path_moments(path, events) if name not in ("begin", "end")]
     said = " Shaded: 95 % by the linear covariance"
     if samples is not None:
         said += f"; dashed: central 95 % of {len(samples.errors)} Monte Carlo runs"
     return Chart(
         slug,
-        title,
+        f"{slug.capitalize()} over time",
         f"{caption}{said}.",
         SINCE_TRIGGER,
         tuple(panels),
