@@ -24,8 +24,8 @@ from strapdown.report.attitude_charts import charts
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import drawings
 from strapdown.report.navigation_document import navigation_document
-from strapdown.report.navigation_evaluation import NavigationEvaluation, paired_errors
-from strapdown.report.paired_corrections import paired_chart
+from strapdown.report.navigation_evaluation import NavigationEvaluation
+from strapdown.report.paired_corrections import paired_chart, paired_errors
 from strapdown.report.simulation import simulation_chart
 from strapdown.report.verdict import heading_chart
 from strapdown.systems.navigation_draft import draft_navigation

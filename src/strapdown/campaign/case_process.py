@@ -141,7 +141,7 @@ def _exactly(stream: IO[bytes], count: int) -> bytes:
     return bytes(parts)
 
 
-def _end_with(parent: int) -> None:
+def end_with(parent: int) -> None:
     """End this process when its keeper ends, however that happens."""
 
     def watch() -> None:
@@ -152,15 +152,13 @@ def _end_with(parent: int) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _limit_memory(megabytes: float) -> None:
-    """Refuse allocations beyond the limit, so that a case meets a MemoryError."""
+def limit_memory(most: int) -> None:
+    """Refuse allocations beyond so many bytes, so that what runs meets a MemoryError."""
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource
 
-        most = int(megabytes * 1e6)
-        resource.setrlimit(
-            resource.RLIMIT_DATA, (most, resource.getrlimit(resource.RLIMIT_DATA)[1])
-        )
+        hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+        resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
 
 
 def main() -> None:
@@ -170,13 +168,13 @@ def main() -> None:
     os.dup2(2, 1)
     # Unbuffered: nothing of the next message is read with one.
     asked = os.fdopen(os.dup(0), "rb", buffering=0)
-    _end_with(os.getppid())
+    end_with(os.getppid())
     from strapdown.campaign.design import Campaign
 
     frozen = _receive(asked)
     campaign = Campaign.thawed(frozen)
     bulk = campaign.bulk() if campaign.spec.base.bulk else None
-    _limit_memory(campaign.spec.limits.memory_mb)
+    limit_memory(int(campaign.spec.limits.memory_mb * 1e6))
     _send(answers, "ready")
     while True:
         try:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import copy
-import importlib
 import json
 import math
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -107,27 +105,6 @@ def with_value(table: Table, path: KeyPath, value: Any) -> Table:
     return out
 
 
-def _named(place: str) -> Callable[..., Any]:
-    """The function of a ``module:name``, imported when it is first called."""
-
-    def call(*given: Any) -> Any:
-        module, _, name = place.partition(":")
-        found = attrgetter(name)(importlib.import_module(f"strapdown.{module}"))
-        return found(*given)
-
-    return call
-
-
-def _checked(form: str, run: str) -> Callable[[Table, str], Any]:
-    """Run a configuration that a form checks; both are named as by `_named`."""
-    check = _named(f"{form}.checked")
-
-    def call(table: Table, name: str) -> Any:
-        return _named(run)(check({**table, "name": name}))
-
-    return call
-
-
 def _save_run(run: Any, out: Path, force: bool) -> Any:
     return run.save(out, force=force)
 
@@ -155,6 +132,12 @@ def _proposed(table: Table) -> Table:
         gnss=None if fixes is None else specify(FixesTable, **fixes),
     )
     return proposal.table
+
+
+def _navigation_view(run: Any) -> Any:
+    from strapdown.report.navigation_evaluation import NavigationEvaluation
+
+    return NavigationEvaluation(run)
 
 
 def _navigation_data(evaluation: Any) -> Table:
@@ -203,6 +186,13 @@ def _navigation_curves(evaluation: Any) -> pd.DataFrame:
         },
         index=errors.time - begin,
     )
+
+
+def _align(table: Table, name: str) -> Any:
+    from strapdown.config.alignment import AlignmentSpec
+    from strapdown.systems.alignment_run import run_alignment
+
+    return run_alignment(AlignmentSpec.checked({**table, "name": name}))
 
 
 def _alignment_data(run: Any) -> Table:
@@ -279,9 +269,35 @@ def _outage(table: Table, name: str) -> Any:
     return run_outage(specify(OutageSpec, **table), budget=False)
 
 
+def _outage_data(run: Any) -> Table:
+    from strapdown.report.outage import outage_parts
+
+    return outage_parts(run)
+
+
 def _outage_curves(run: Any) -> pd.DataFrame:
     time, bound, _ = run.cone
     return pd.DataFrame({"horizontal_95_m": bound}, index=time - time[0])
+
+
+def _calibrate(table: Table, name: str) -> Any:
+    from strapdown.config.logs import CalibrateSpec
+    from strapdown.systems.calibrate_run import run_calibrate
+
+    return run_calibrate(CalibrateSpec.checked({**table, "name": name}))
+
+
+def _calibrate_data(run: Any) -> Table:
+    from strapdown.report.calibrate import calibrate_json
+
+    return calibrate_json(run)
+
+
+def _doctor(table: Table, name: str) -> Any:
+    from strapdown.config.logs import DoctorSpec
+    from strapdown.systems.doctor import run_doctor
+
+    return run_doctor(DoctorSpec.checked({**table, "name": name}))
 
 
 def _doctor_data(run: Any) -> Table:
@@ -471,10 +487,10 @@ KINDS: dict[str, Kind] = {
         ("log", "path"),
         _navigation_curves,
         ("horizontal_error_m", "horizontal_sd_m", "height_error_m", "heading_error_deg"),
-        _named("report.navigation_evaluation:NavigationEvaluation"),
+        _navigation_view,
     ),
     "align": Kind(
-        _checked("config.alignment:AlignmentSpec", "systems.alignment_run:run_alignment"),
+        _align,
         _alignment_data,
         _save_run,
         {
@@ -500,7 +516,7 @@ KINDS: dict[str, Kind] = {
     ),
     "outage": Kind(
         _outage,
-        _named("report.outage:outage_parts"),
+        _outage_data,
         _save_run,
         {
             key: f"at_the_end.{key}"
@@ -529,14 +545,14 @@ KINDS: dict[str, Kind] = {
         curve_names=("north_m", "east_m", "speed_m_per_s"),
     ),
     "calibrate": Kind(
-        _checked("config.logs:CalibrateSpec", "systems.calibrate_run:run_calibrate"),
-        _named("report.calibrate:calibrate_json"),
+        _calibrate,
+        _calibrate_data,
         _save_run,
         {"rests": "rests", "excess": "excess"},
         log=("logs", 0, "path"),
     ),
     "doctor": Kind(
-        _checked("config.logs:DoctorSpec", "systems.doctor:run_doctor"),
+        _doctor,
         _doctor_data,
         _save_run,
         {

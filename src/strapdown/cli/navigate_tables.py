@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from strapdown.cli.console import WORDS, console, print_block, print_findings, print_table
 from strapdown.errors import Finding
-from strapdown.live.replay import Latency
 from strapdown.report.document import MOST_SAID, TableBlock
 from strapdown.report.navigation_document import (
     cautions,
@@ -24,7 +24,6 @@ from strapdown.report.navigation_evaluation import (
     distance_over_ground,
     trust,
 )
-from strapdown.report.paired_corrections import paired_table
 from strapdown.report.values import (
     duration_words,
     length_words,
@@ -34,6 +33,9 @@ from strapdown.report.values import (
 from strapdown.report.verdict import terminal_lines
 from strapdown.rotation import within_half_turn
 from strapdown.systems.navigation_run import NavigationRun
+
+if TYPE_CHECKING:
+    from strapdown.live.replay import Latency
 
 #: Most lines of the answer, of which the paths and the seal take the last four.
 LINES, PATHS = 40, 4
@@ -70,23 +72,17 @@ def print_navigation(
     distance = length_words(distance_over_ground(trajectory))
     name = f"{result.source.name}: {result.source.what}"
     out.print(spaced(f"{name}, {duration}, {distance}, {len(time)} samples"))
-    tables: list[TableBlock | None]
+    pair: TableBlock | None = None
+    if evaluation.pair:
+        from strapdown.report.paired_corrections import paired_table
+
+        pair = paired_table(evaluation)
+    seen = pair, point_table(evaluation), observation_table(evaluation)
+    withheld = withheld_table(evaluation)
+    tables: tuple[TableBlock | None, ...] = (_end(evaluation), *seen, withheld)
     if verbose:
-        tables = [
-            end_table(evaluation),
-            error_table(evaluation),
-            paired_table(evaluation),
-            point_table(evaluation),
-        ]
-        tables += [
-            observation_table(evaluation),
-            outage_table(evaluation),
-            withheld_table(evaluation),
-        ]
-        tables += [state_table(evaluation)]
-    else:
-        tables = [_end(evaluation), paired_table(evaluation), point_table(evaluation)]
-        tables += [observation_table(evaluation), withheld_table(evaluation)]
+        ends = end_table(evaluation), error_table(evaluation)
+        tables = (*ends, *seen, outage_table(evaluation), withheld, state_table(evaluation))
     lines = [(verdict.sentence, STYLES[verdict.verdict])]
     lines += [(f"{head}: {said}", "") for head, said in cautions(evaluation, brief=not verbose)]
     lines += terminal_lines(evaluation, brief=not verbose)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, StrictInt
@@ -34,9 +34,11 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.triad_units import axes_matrix
-from strapdown.sensors.calibration import SensorCalibration
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty, stated_imu
+
+if TYPE_CHECKING:
+    from strapdown.sensors.calibration import SensorCalibration
 
 #: An hour at 4 kHz.
 MOST_SAMPLES = 1.5e7
@@ -209,6 +211,8 @@ def sensors_of(spec: Any) -> ImuUncertainty:
     log = getattr(spec, "log", None)
     if log is None or log.calibration is None:
         return stated_imu(sensor, stated.gyro, stated.accel, unit_factor=stated.unit_factor)
+    from strapdown.sensors.calibration import SensorCalibration
+
     known = _axes_of(SensorCalibration.read(log.calibration), spec.axes)
     return stated_imu(
         sensor, stated.gyro, stated.accel, known.uncertainty, unit_factor=stated.unit_factor

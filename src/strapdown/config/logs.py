@@ -26,7 +26,6 @@ from strapdown.config.spec import (
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.gnss_fixes import GnssOptions, utm_zone
 from strapdown.formats.recording import as_stated
-from strapdown.sensors.bridge import target_of
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import NAMED_AXES, check_axes_matrix
 from strapdown.tables.sample_clock import ends_of_part
@@ -168,6 +167,12 @@ class DoctorSpec(FileSpec):
             yield Fault(("axes",), "config.axes-of-each-log", data)
 
 
+def _target(name: str) -> object:
+    from strapdown.sensors.bridge import target_of
+
+    return target_of(name)
+
+
 class AllanSpec(FileSpec):
     """Logs at rest, for the noise of their sensor."""
 
@@ -179,7 +184,7 @@ class AllanSpec(FileSpec):
     #: Whether the whole part is taken as stationary, as stated, without a test.
     at_rest: StrictBool = False
     #: Program whose parameters the result gives as well, of `sensors.bridge.TARGETS`.
-    target: Annotated[Word, accepted_by(target_of)] | None = None
+    target: Annotated[Word, accepted_by(_target)] | None = None
 
 
 PROCEDURES = ("positions", "six-position", "turns", "rate-table", "magnetometer")

@@ -29,10 +29,6 @@ from strapdown.crash.case_contact import (
     main_event,
 )
 from strapdown.crash.case_indices import CrashIndex, occupant_indices, vehicle_indices
-from strapdown.crash.closure import (
-    Blame,
-    Closure,
-)
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound
 from strapdown.crash.entry import Entry
@@ -72,6 +68,7 @@ from strapdown.systems.one_thread import one_thread
 from strapdown.units import FORCES, SPEEDS, unit_of
 
 if TYPE_CHECKING:
+    from strapdown.crash.closure import Blame, Closure
     from strapdown.crash.drive_entry import DriveEntry
 
 # Standard deviation of a speed of the wheels, and of the place of an axle that is stated.

@@ -12,30 +12,14 @@ import pandas as pd
 
 from strapdown.config.crash_case import CaseSpec, EntrySpec, PointSpec, ReferenceSpec, VehicleSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
-from strapdown.crash.closure import (
-    Closure,
-    Figure,
-    ImpactVehicle,
-    against_barrier,
-    blame,
-    blame_points,
-    close_vehicles,
-)
-from strapdown.crash.deformation import (
-    Crush,
-    crush_energy,
-    dynamic_crush,
-    energy_equivalent_speed,
-    energy_share,
-    equal_force_share,
-    impulse_of,
-)
 from strapdown.crash.path import at_instant
 from strapdown.crash.reconstruction import CrashReconstruction, UnitReconstruction
 from strapdown.errors import ConfigError, DataError, Finding
 
 if TYPE_CHECKING:
     from strapdown.crash.case import CaseResult
+    from strapdown.crash.closure import Closure, Figure, ImpactVehicle
+    from strapdown.crash.deformation import Crush
 
 #: Kinds of entry that are found from the drive before the crash.
 OF_DRIVES = ("gnss", "speed_record")
@@ -82,6 +66,16 @@ def deformed(
 ) -> tuple[Deformation, tuple[ReferenceSpec, ...]]:
     """Deformation of the vehicle, and its references with the forces as changes of velocity."""
     vehicle, number = spec.vehicle, main_event(made.main)
+    forces = [one for one in spec.references if one.kind == "force"]
+    if vehicle.deformation is None and vehicle.against != "barrier" and not forces:
+        return Deformation(), tuple(spec.references)
+    from strapdown.crash.deformation import (
+        crush_energy,
+        dynamic_crush,
+        energy_equivalent_speed,
+        impulse_of,
+    )
+
     energy = equivalent = None
     if (d := vehicle.deformation) is not None:
         energy = crush_energy(
@@ -169,6 +163,9 @@ def _as_change(
 
 def closed_together(first: CaseResult, second: CaseResult) -> tuple[CaseResult, CaseResult]:
     """Both results with their closure, and with what contradicts it."""
+    from strapdown.crash.closure import blame, blame_points, close_vehicles
+    from strapdown.crash.deformation import energy_share, equal_force_share
+
     names = first.vehicle_names
     pair, findings = [], []
     for result, name in zip((first, second), names, strict=True):
@@ -212,6 +209,8 @@ def closed_together(first: CaseResult, second: CaseResult) -> tuple[CaseResult, 
 
 def closed_against_barrier(result: CaseResult) -> CaseResult:
     """A result with what it says against a rigid barrier."""
+    from strapdown.crash.closure import against_barrier
+
     name = result.vehicle_names[0]
     vehicle = _vehicle_of(result, result.reconstruction.main, name)
     if vehicle is None:
@@ -283,6 +282,8 @@ def impact_vehicle(
     of that is of the resolved change, with what the vehicle may have turned since, but for the
     heading of the entry, which turns the entry velocity, too, and is an unknown of its own.
     """
+    from strapdown.crash.closure import ImpactVehicle
+
     number = main_event(unit)
     over_ground = None if number is None else unit.ned[number]
     if number is None or over_ground is None:

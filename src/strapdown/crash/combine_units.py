@@ -127,7 +127,8 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
     if levelled and rest is not None and rest.accel_mean is not None:
         roll, pitch = level(rest.accel_mean)
         mean = replace(mean, roll_deg=roll, pitch_deg=pitch)
-        tilt = level_turned_by(effects.rest_force, _level(mean))
+        C_nb = rotation.dcm_from_euler([roll, pitch, 0.0])
+        tilt = level_turned_by(effects.rest_force, C_nb)
         effects = replace(effects, tilt=effects.tilt + tilt)
     return PointKinematics(
         name,
@@ -186,14 +187,11 @@ def _common_rest(units: Sequence[PointKinematics], time: Array) -> tuple[float, 
     return (start, end) if within.sum() >= LEAST_SAMPLES else None
 
 
-def _level(levelling: Levelling) -> Array:
-    return rotation.dcm_from_euler([levelling.roll_deg, levelling.pitch_deg, 0.0])
-
-
 def _without_own_tilt(unit: PointKinematics) -> SampleEffects:
     """Effects without the tilt from the stationary force, which is that of the mean."""
-    effects = unit.effects
-    tilt = level_turned_by(effects.rest_force, _level(unit.levelling))
+    effects, own = unit.effects, unit.levelling
+    C_nb = rotation.dcm_from_euler([own.roll_deg, own.pitch_deg, 0.0])
+    tilt = level_turned_by(effects.rest_force, C_nb)
     return replace(effects, tilt=effects.tilt - tilt)
 
 

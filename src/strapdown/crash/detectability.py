@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,42 +20,29 @@ from strapdown.crash.measuring_point import PointKinematics
 from strapdown.crash.structure import unlearnt
 from strapdown.errors import Finding
 
-Wrong = Callable[[VelocityIncrements], VelocityIncrements]
-
 #: A gross scale factor, a position and a mounting that a tape and an eye would make.
 SCALE, POSITION, TURNED_DEG = 1.25, 0.25, 5.0
 
 
-def _times(matrix: np.ndarray) -> Wrong:
-    return lambda one: replace(one, values=one.values @ matrix.T)
-
-
-def _opposite(one: VelocityIncrements) -> VelocityIncrements:
-    """With the sign of the horizontal axis that changed most reversed."""
-    matrix = np.eye(3)
+def wrong_ones(one: VelocityIncrements) -> dict[str, VelocityIncrements]:
+    """Increments of a unit with each of the errors that are tried, by the codes of their names."""
+    opposite = np.eye(3)
+    # Along the horizontal axis that changed most.
     main = int(np.argmax(np.abs(one.values[:, :2].sum(axis=0))))
-    matrix[main, main] = -1.0
-    return _times(matrix)(one)
-
-
-def _moved(one: VelocityIncrements) -> VelocityIncrements:
+    opposite[main, main] = -1.0
+    values = {
+        "crash.wrong-sign": one.values @ opposite.T,
+        "crash.wrong-axes": one.values @ np.eye(3)[[1, 0, 2]].T,
+        "crash.wrong-scale": one.values @ np.diag([SCALE, SCALE, 1.0]).T,
+        "crash.wrong-position": one.values,
+        "crash.wrong-heading": one.values
+        @ rotation.dcm_from_rotation_vector([0.0, 0.0, np.radians(TURNED_DEG)]).T,
+    }
     turning = body_turning((one,))
-    if turning is None:
-        return one
-    off = (turning.lever @ (POSITION * np.array([1.0, 1.0, 0.0]))).reshape(-1, 3)
-    return replace(one, values=one.values + off)
-
-
-#: Errors that are tried, by the codes of their names.
-WRONG: Mapping[str, Wrong] = {
-    "crash.wrong-sign": _opposite,
-    "crash.wrong-axes": _times(np.eye(3)[[1, 0, 2]]),
-    "crash.wrong-scale": _times(np.diag([SCALE, SCALE, 1.0])),
-    "crash.wrong-position": _moved,
-    "crash.wrong-heading": _times(
-        rotation.dcm_from_rotation_vector([0.0, 0.0, np.radians(TURNED_DEG)])
-    ),
-}
+    if turning is not None:
+        off = (turning.lever @ (POSITION * np.array([1.0, 1.0, 0.0]))).reshape(-1, 3)
+        values["crash.wrong-position"] = one.values + off
+    return {code: replace(one, values=moved) for code, moved in values.items()}
 
 
 def undetectable(
@@ -63,10 +50,10 @@ def undetectable(
 ) -> list[Finding]:
     """State the errors that a comparison of agreeing units would not detect.
 
-    Each of `WRONG` is put into the record of one unit after another, which is then compared with
-    the others as in `compare_units`, structure and turning learnt anew. One that a unit could have
-    without a contradiction is listed. Errors common to all units never show: their records are
-    those of another crash.
+    Each of `wrong_ones` is put into the record of one unit after another, which is then compared
+    with the others as in `compare_units`, structure and turning learnt anew. One that a unit could
+    have without a contradiction is listed. Errors common to all units never show: their records
+    are those of another crash.
 
     Parameters
     ----------
@@ -86,13 +73,13 @@ def undetectable(
     edges, rigid = comparison.edges, unlearnt(units)
     increments = [velocity_increments(u, edges) for u in units]
     cut = [clipped_pieces(u, edges) for u in units]
+    tried = [wrong_ones(one) for one in increments]
     hidden = []
-    for code, wrong in WRONG.items():
+    for code in tried[0]:
         for k, unit in enumerate(units):
-            tried = wrong(increments[k])
             pairs = (
                 compare_pair(
-                    *(unit, other, tried, increments[j], ~(cut[k] | cut[j]), level, rigid),
+                    *(unit, other, tried[k][code], increments[j], ~(cut[k] | cut[j]), level, rigid),
                     explained=False,
                 )
                 for j, other in enumerate(units)

@@ -463,7 +463,8 @@ def _carried(
     start = np.concatenate([effects.tilt, np.zeros((len(effects.names), 6))], axis=1)
     errors = leg.errors(start)[:, -1]
     noise = leg.noise_covariance()[-1]
-    at_entry = there.attitude_before(leg.nominal[-1, Q : Q + 4])
+    back = rotation.quaternion_from_rotation_vector(-there.turn)
+    at_entry = rotation.compose(leg.nominal[-1, Q : Q + 4], back)
     heading = float(rotation.euler_from_quaternion(at_entry)[2])
     turn = rotation.dcm_from_euler([0.0, 0.0, origin.heading_deg - heading])
     twist = np.kron(np.eye(3), turn)
@@ -618,10 +619,6 @@ class ToStamp:
     push: Array
     turn_errors: Array
     push_errors: Array
-
-    def attitude_before(self, q_nb: Array) -> Array:
-        """Attitude at the entry from that at the sample, (4,)."""
-        return rotation.compose(q_nb, rotation.quaternion_from_rotation_vector(-self.turn))
 
     def attitude_after(self, q_nb: Array) -> Array:
         """Attitude at the sample from that at the entry, (4,)."""

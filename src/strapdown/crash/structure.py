@@ -120,24 +120,21 @@ class Structure:
         """Largest standard deviation along each vehicle axis, (3,), m/s, as bounds count it."""
         return self.expected * self.change
 
-    def correlation(self, time: Array) -> Array:
+    def correlation(self, time: Array, correlation_time: float) -> Array:
         """Covariance of velocities at instants, (k, k), for a largest variance of one."""
-        return self._correlation(time, self.correlation_time)
-
-    def _correlation(self, time: Array, correlation_time: float) -> Array:
         w = np.interp(time, self.time, self.envelope, left=0.0, right=0.0)
         apart = np.abs(time[:, None] - time)
         return np.asarray(w[:, None] * w * np.exp(-apart / correlation_time))
 
     def expected_covariances(self, time: Array) -> Array:
         """Covariance of velocities at instants as bounds count it, (3, k, k), (m/s)², by axis."""
-        each = np.array([self._correlation(time, one) for one in CORRELATION_TIMES])
+        each = np.array([self.correlation(time, one) for one in CORRELATION_TIMES])
         return np.asarray(self.change**2 * np.einsum("ta,tij->aij", self.squares, each))
 
     def of_increments(self, edges: Array) -> Array:
         """Covariance of increments between edges, (m, m), for a largest variance of one."""
         step = np.diff(np.eye(len(edges)), axis=0)
-        return np.asarray(step @ self.correlation(edges) @ step.T)
+        return np.asarray(step @ self.correlation(edges, self.correlation_time) @ step.T)
 
     def expected_of_increments(self, edges: Array) -> Array:
         """Covariance of increments, (m, m), (m/s)², along the axis that moves most."""

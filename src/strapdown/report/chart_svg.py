@@ -543,7 +543,7 @@ def _upright(chart: Chart, k: int, named: bool, x: Scale, y: Scale) -> tuple[flo
     if y.power:
         above += TICK + 2.0
     if chart.marks and k == _first_timed(chart):
-        above += 2.0 + _ROW * (1 + max(_mark_rows(chart, x)))
+        above += 2.0 + _ROW * (1 + max(row for _, _, row, _ in _marks(chart, x)))
     below = 0.0
     if named:
         below += LONG + TICK + 6.0
@@ -563,15 +563,16 @@ def _x_name(chart: Chart, k: int) -> str:
     return chart.x_label if chart.beside or k == len(chart.panels) - 1 else ""
 
 
-def _letter(chart: Chart) -> float:
-    """Approximate width of a letter of a mark's name, as a share of the axis."""
-    beside = len(chart.panels) if chart.beside else 1
-    return 0.56 * LEVEL / (0.87 * _WIDTH / beside)
-
-
-def _mark_rows(chart: Chart, x: Scale) -> tuple[int, ...]:
+def _marks(chart: Chart, x: Scale) -> list[tuple[Mark, float, int, str]]:
+    """Marks, each with its share of the axis, and row above it and alignment of its name."""
+    # Approximate width of a letter, as a share of the axis.
+    letter = 0.56 * LEVEL / (0.87 * _WIDTH / (len(chart.panels) if chart.beside else 1))
     shares = x.share([mark.x for mark in chart.marks]).tolist()
-    return label_rows(shares, [mark.label for mark in chart.marks], _letter(chart))
+    rows = label_rows(shares, [mark.label for mark in chart.marks], letter)
+    return [
+        (mark, share, row, label_side(share, mark.label, letter))
+        for mark, share, row in zip(chart.marks, shares, rows, strict=True)
+    ]
 
 
 def _folded(text: str, width: float, size: float, bold: bool = False) -> list[str]:
@@ -630,15 +631,13 @@ def _around(drawing: Drawing, chart: Chart, frame: Frame) -> None:
 def _write_marks(drawing: Drawing, chart: Chart, frame: Frame, above: float) -> float:
     """Name the marks above the axes, one above the other where they are close."""
     left, _, right, _ = frame.box
-    rows = _mark_rows(chart, frame.x)
-    shares = frame.x.share([mark.x for mark in chart.marks]).tolist()
-    for mark, share, row in zip(chart.marks, shares, rows, strict=True):
-        side = label_side(share, mark.label, _letter(chart))
+    placed = _marks(chart, frame.x)
+    for mark, share, row, side in placed:
         anchor = {"left": "start", "center": "middle", "right": "end"}[side]
         at = (left + share * (right - left), above - _ROW * (row + 0.5))
         with drawing.group(data_at=f"{number(at[0])} -", data_group=frame.group):
             drawing.text(at, mark.label, LEVEL, RED, anchor=anchor)
-    return above - _ROW * (1 + max(rows))
+    return above - _ROW * (1 + max(row for _, _, row, _ in placed))
 
 
 def _power(power: int) -> str:

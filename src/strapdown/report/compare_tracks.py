@@ -26,7 +26,7 @@ from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.navigation.truth_comparison import rows_of_marks, time_shares
 from strapdown.report.compare_folders import LONGEST, RunPart, SealedRun
 from strapdown.report.compare_numbers import is_over_ground
-from strapdown.report.crash_case import table_in_si
+from strapdown.report.crash_case import table_in
 from strapdown.tables import EULER, NED, QUATERNION, VELOCITY
 
 __all__ = [
@@ -193,7 +193,7 @@ def _crashed(part: RunPart) -> Iterator[Track]:
     system = data.get("units")
     columns = _columns(part, "trajectory.csv")
     whole = pd.DataFrame(columns).set_index("time_s")
-    whole = table_in_si(system if isinstance(system, str) else "metric", whole)
+    whole = table_in(str(system), whole, back=True)
     names = {f"{n}_{u}": n for n, u in _UNITS.items()}
     sds = {f"{n}_sd_{u}": n for n, u in _UNITS.items()}
     if not {*names, *sds} <= set(whole.columns):

@@ -189,9 +189,9 @@ def crash_stills(
     places = path.table[NED].to_numpy(dtype=np.float64)
     instants = _instants(path, events)
     rows = [int(np.abs(path.time - at).argmin()) for _, at in instants]
-    flat = _Projection(path.entry.heading_deg)
+    flat, away = _projection(path.entry.heading_deg)
     corners = [body.placed(places[k], path.q_nb[k], point) for k in rows]
-    shown = flat.page(np.vstack([*corners, places]))
+    shown = np.vstack([*corners, places]) @ flat
     low, high = shown.min(axis=0), shown.max(axis=0)
     size = np.maximum(high - low, 0.5)
     columns = 2 if size[0] > _WIDE * size[1] else 3
@@ -200,6 +200,8 @@ def crash_stills(
     height = scale * float(size[1]) + 16.0
     lines = -(-len(rows) // columns)
     words = ", ".join(f"{name} {plain(1e3 * at, 0)} ms" for name, at in instants)
+    spanned = np.vstack([places, *corners])[:, :2]
+    step = nice_step(float(np.ptp(spanned, axis=0).max()) / 12.0)
     out = Drawing(_WIDTH, lines * (height + _HEAD + _GAP), f"The vehicle in space at {words}")
     for k, (row, (name, at)) in enumerate(zip(rows, instants, strict=True)):
         left = (k % columns) * (width + _GAP)
@@ -207,17 +209,19 @@ def crash_stills(
         centre = np.array([left + 0.5 * width, top + _HEAD + 0.5 * height])
 
         def pixels(points: Array, centre: Array = centre) -> Array:
-            page = flat.page(points) - 0.5 * (low + high)
+            page = points @ flat - 0.5 * (low + high)
             return np.asarray(centre + scale * page * [1.0, -1.0])
 
         _cell(out, (left, top, width, height), f"{plain(1e3 * at, 0)} ms", name)
         shadow = places.copy()
         shadow[:, 2] = ground
         with out.group((left, top + _HEAD, left + width, top + _HEAD + height)):
-            _ground_lines(out, pixels, (places, corners), ground)
+            _ground_lines(out, pixels, spanned, step, ground)
             out.shape(pixels(shadow), "#8a939e", 1.0, "dash", closed=False)
             out.shape(pixels(shadow[: row + 1]), BLUE, 2.2, closed=False)
-            _body(out, body, corners[k], flat, pixels)
+            for f in body.seen(corners[k], away):
+                face = pixels(corners[k][list(body.faces[f])])
+                out.shape(face, "#3d5166", 0.6, fill=body.colours[f])
     return Picture(
         "motion",
         out.svg(),
@@ -225,27 +229,22 @@ def crash_stills(
         "The vehicle at instants of its path, in parallel projection from the right, ahead and "
         "above of its attitude at the entry. Blue: path of the reference point up to that instant, "
         "projected onto the ground; dashed: the whole path. Lines on the ground are "
-        f"{_step(places, corners):g} m apart.",
+        f"{step:g} m apart.",
         out.alt,
     )
 
 
-class _Projection:
-    """Parallel projection onto a page: right and up; depth grows away from the viewer."""
-
-    def __init__(self, heading_deg: float) -> None:
-        heading, around = math.radians(heading_deg), -math.radians(_AHEAD)
-        above = math.radians(_ABOVE)
-        ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
-        right = np.array([-math.sin(heading), math.cos(heading), 0.0])
-        up = np.array([0.0, 0.0, -1.0])
-        away = math.sin(around) * ahead - math.cos(around) * right
-        across = math.cos(around) * ahead + math.sin(around) * right
-        self._page = np.column_stack([across, math.cos(above) * up + math.sin(above) * away])
-        self.away = math.cos(above) * away - math.sin(above) * up
-
-    def page(self, points: Array) -> Array:
-        return np.asarray(points @ self._page)
+def _projection(heading_deg: float) -> tuple[Array, Array]:
+    """Right and up of a page that is projected onto, (3, 2), and the direction away from it."""
+    heading, around = math.radians(heading_deg), -math.radians(_AHEAD)
+    above = math.radians(_ABOVE)
+    ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
+    right = np.array([-math.sin(heading), math.cos(heading), 0.0])
+    up = np.array([0.0, 0.0, -1.0])
+    away = math.sin(around) * ahead - math.cos(around) * right
+    across = math.cos(around) * ahead + math.sin(around) * right
+    page = np.column_stack([across, math.cos(above) * up + math.sin(above) * away])
+    return page, math.cos(above) * away - math.sin(above) * up
 
 
 def _instants(path: CrashPath, events: Sequence[CrashEvent]) -> list[tuple[str, float]]:
@@ -275,20 +274,12 @@ def _cell(out: Drawing, box: tuple[float, float, float, float], when: str, name:
     out.text((after + 6.0, top + 10.0), name, SMALL, "#4a525c")
 
 
-def _step(places: Array, corners: list[Array]) -> float:
-    """Spacing of the lines on the ground, m."""
-    every = np.vstack([places, *corners])[:, :2]
-    return nice_step(float(np.ptp(every, axis=0).max()) / 12.0)
-
-
 def _ground_lines(
-    out: Drawing, pixels: Callable[[Array], Array], shown: tuple[Array, list[Array]], ground: float
+    out: Drawing, pixels: Callable[[Array], Array], spanned: Array, step: float, ground: float
 ) -> None:
-    places, corners = shown
-    every = np.vstack([places, *corners])
-    low, high = every[:, :2].min(axis=0), every[:, :2].max(axis=0)
-    step = _step(places, corners)
-    low, high = np.floor(low / step) * step, np.ceil(high / step) * step
+    """Lines on the ground, `step` m apart, under the points (n, 2) that it is to span."""
+    low = np.floor(spanned.min(axis=0) / step) * step
+    high = np.ceil(spanned.max(axis=0) / step) * step
     for axis in (0, 1):
         other = 1 - axis
         for k in range(round((high[axis] - low[axis]) / step) + 1):
@@ -296,19 +287,6 @@ def _ground_lines(
             ends[:, axis] = low[axis] + k * step
             ends[:, other] = low[other], high[other]
             out.shape(pixels(ends), _GRID, 0.7, closed=False)
-
-
-def _body(
-    out: Drawing,
-    body: VehicleBody,
-    corners: Array,
-    flat: _Projection,
-    pixels: Callable[[Array], Array],
-) -> None:
-    """Draw the visible faces."""
-    for f in body.seen(corners, flat.away):
-        points = pixels(corners[list(body.faces[f])])
-        out.shape(points, "#3d5166", 0.6, fill=body.colours[f])
 
 
 # The vehicle as a 3D body: its outline with a height, its front marked.

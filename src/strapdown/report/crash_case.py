@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from strapdown import __version__
-from strapdown.bundle import names_file, write_json
+from strapdown.bundle import with_paths, write_json
 from strapdown.config.crash_case import CaseSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer, run_cases
 from strapdown.crash.case_contact import Deformation, main_event
 from strapdown.crash.case_indices import CrashIndex
-from strapdown.crash.closure import Closure, Figure
 from strapdown.crash.consistency import UnitComparison
 from strapdown.crash.crash_type import CrashType
 from strapdown.crash.delta_v_bound import EventChanges, VelocityChange
@@ -27,7 +26,6 @@ from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof import NedPdof
 from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
-from strapdown.formats.crash_writers import write_mme
 from strapdown.progress import Progress
 from strapdown.report import crash_words
 from strapdown.report.report_bundle import (
@@ -42,6 +40,9 @@ from strapdown.report.values import AXES, shown_in, spaced
 from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
 from strapdown.tables.checks import Array, index_of
 from strapdown.units import FORCES, LENGTHS, MOMENTS, SPEEDS
+
+if TYPE_CHECKING:
+    from strapdown.crash.closure import Closure, Figure
 
 
 def _configuration(result: CaseResult) -> dict[str, Any]:
@@ -69,14 +70,16 @@ def _write(
     with shown_in(system):
         told = as_comments(crash_words.conventions())
     main = result.reconstruction.main
-    table = _table_in(system, trajectory_table(main.path))
+    table = table_in(system, trajectory_table(main.path))
     write_table(table, folder / "trajectory.csv", told)
     answers, formats = result.reconstruction.answers, result.spec.options.formats
     made: set[str] = set()
     for unit in answers if "csv" in formats else ():
         own = file_name(unit.name, made)
-        write_table(_table_in(system, signals_table(unit)), folder / f"signals-{own}.csv", told)
+        write_table(table_in(system, signals_table(unit)), folder / f"signals-{own}.csv", told)
     if "mme" in formats:
+        from strapdown.formats.crash_writers import write_mme
+
         spec = result.spec
         record = signal_record(spec.title, spec.point.name, answers, spec.options.rate_hz)
         write_mme(folder / "mme", record)
@@ -153,10 +156,14 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
             "contradictions": _pairs(crash_words.contradictions(result)),
             "not_shown": _pairs(crash_words.not_shown(result)),
             "findings": [f.plain("file") for f in result.findings],
-            "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
+            # With the names of files instead of their paths.
+            "case": with_paths(
+                result.spec.model_dump(mode="json", exclude_none=True),
+                lambda path: path.replace("\\", "/").rstrip("/").rsplit("/", 1)[-1],
+            ),
         }
     case = found.pop("case")
-    return finite({**_labelled(result.spec.options.units, found), "case": case})
+    return finite({**_labelled(_endings(result.spec.options.units), found), "case": case})
 
 
 # Endings of keys and columns, with those in which a system of units has them and their factors; the
@@ -173,24 +180,29 @@ _LABELS: dict[str, dict[str, tuple[str, float]]] = {
 }
 
 
-def _label(system: str, key: str) -> tuple[str, float]:
-    """Key in a system of units, and the factor of its values."""
-    for ending, (other, factor) in _LABELS.get(system, {}).items():
-        if key.endswith(ending):
-            return key.removesuffix(ending) + other, factor
-    return key, 1.0
+def _endings(system: str, *, back: bool = False) -> Mapping[str, tuple[str, float]]:
+    """Endings in SI with those of a system of units and their factors; or `back` to SI."""
+    found = _LABELS.get(system, {})
+    return {other: (own, 1.0 / f) for own, (other, f) in found.items()} if back else found
 
 
-def _labelled(system: str, value: Any, factor: float = 1.0) -> Any:
-    """Data with the keys and numbers of a system of units."""
+def _label(endings: Mapping[str, tuple[str, float]], key: str) -> tuple[str, float]:
+    """Key with another ending, and the factor of its values."""
+    ending = max((e for e in endings if key.endswith(e)), key=len, default="")
+    other, factor = endings.get(ending, ("", 1.0))
+    return key.removesuffix(ending) + other, factor
+
+
+def _labelled(endings: Mapping[str, tuple[str, float]], value: Any, factor: float = 1.0) -> Any:
+    """Data with other endings of their keys, and their numbers."""
     if isinstance(value, dict):
         found = {}
         for key, item in value.items():
-            name, own = _label(system, key)
-            found[name] = _labelled(system, item, factor * own)
+            name, own = _label(endings, key)
+            found[name] = _labelled(endings, item, factor * own)
         return found
     if isinstance(value, list):
-        return [_labelled(system, item, factor) for item in value]
+        return [_labelled(endings, item, factor) for item in value]
     if isinstance(value, float) and factor != 1.0:
         return factor * value
     return value
@@ -198,57 +210,17 @@ def _labelled(system: str, value: Any, factor: float = 1.0) -> Any:
 
 def in_si(data: dict[str, Any]) -> dict[str, Any]:
     """Return the plain data of a case, as `crash_json`, with SI keys and numbers."""
-    system = data.get("units")
-    if not isinstance(system, str) or system not in _LABELS:
-        return data
-    back = {other: (key, 1.0 / f) for key, (other, f) in _LABELS[system].items()}
-    return {key: value if key == "case" else _si(value, back, key) for key, value in data.items()}
+    back = _endings(str(data.get("units")), back=True)
+    return {k: value if k == "case" else _labelled(back, value) for k, value in data.items()}
 
 
-def _si(value: Any, back: dict[str, tuple[str, float]], key: str = "", factor: float = 1.0) -> Any:
-    if isinstance(value, dict):
-        found = {}
-        for name, item in value.items():
-            ending = max((e for e in back if name.endswith(e)), key=len, default="")
-            own, by = back.get(ending, ("", 1.0))
-            found[name.removesuffix(ending) + own] = _si(item, back, name, factor * by)
-        return found
-    if isinstance(value, list):
-        return [_si(item, back, key, factor) for item in value]
-    if isinstance(value, float) and factor != 1.0:
-        return factor * value
-    return value
-
-
-def _table_in(system: str, table: pd.DataFrame) -> pd.DataFrame:
-    """Table with the columns of a system of units."""
-    labels = {str(column): _label(system, str(column)) for column in table.columns}
+def table_in(system: str, table: pd.DataFrame, *, back: bool = False) -> pd.DataFrame:
+    """Return a table with the columns of a system of units; or one of that system `back` in SI."""
+    endings = _endings(system, back=back)
+    labels = {str(column): _label(endings, str(column)) for column in table.columns}
     factors = {column: factor for column, (_, factor) in labels.items() if factor != 1.0}
     changed = table.assign(**{column: f * table[column] for column, f in factors.items()})
     return changed.rename(columns={column: name for column, (name, _) in labels.items()})
-
-
-def _named(value: Any, key: str = "") -> Any:
-    """The case specification with file names instead of paths."""
-    if isinstance(value, dict):
-        return {k: _named(v, k) for k, v in value.items()}
-    if isinstance(value, list):
-        return [_named(v, key) for v in value]
-    if names_file(key, value):
-        return str(value).replace("\\", "/").rstrip("/").rsplit("/", 1)[-1]
-    return value
-
-
-def table_in_si(system: str, table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table that was written in a system of units, with SI columns."""
-    back = {other: (key, 1.0 / f) for key, (other, f) in _LABELS.get(system, {}).items()}
-    columns = {}
-    for name in map(str, table.columns):
-        ending = max((e for e in back if name.endswith(e)), key=len, default="")
-        own, factor = back.get(ending, ("", 1.0))
-        values = table[name]
-        columns[name.removesuffix(ending) + own] = values if factor == 1.0 else factor * values
-    return pd.DataFrame(columns, index=table.index)
 
 
 def _pairs(rows: Sequence[tuple[str, str]]) -> list[dict[str, str]]:
@@ -498,11 +470,9 @@ def _severity(answer: SeverityAnswer) -> dict[str, Any]:
 
 
 def _index(index: CrashIndex, system: str) -> dict[str, Any]:
-    label, factor = _label(system, "_m_per_s")
-    unit = index.unit
-    if unit != "m/s" or factor == 1.0:
-        factor = 1.0
-    else:
+    unit, factor = index.unit, 1.0
+    if unit == "m/s" and system in _LABELS:
+        label, factor = _label(_endings(system), "_m_per_s")
         unit = label.removeprefix("_")
     return {
         "index": index.name,

@@ -14,7 +14,7 @@ from strapdown.crash.case import ReferenceAnswer
 from strapdown.crash.consistency import UnitComparison
 from strapdown.crash.contact import Edge
 from strapdown.crash.delta_v import cumulative_delta_v, trailing_delta_v
-from strapdown.crash.delta_v_bound import DeltaVBound, VelocityChange, body_delta_v_bound
+from strapdown.crash.delta_v_bound import VelocityChange, body_delta_v_bound
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof import SHIFTS, WINDOWS, pdof_by_shift, pdof_by_window
@@ -121,14 +121,12 @@ def delta_v_half_widths(
     for at in instants.tolist():
         weights = window_weights(acceleration.time, onset.time, at, acceleration.sampling)
         bound = body_delta_v_bound(of.effects, weights, rest_sd=rest_sd, at_ends=moved)
-        rows.append([*bound.half_width, _along(bound, weights @ acceleration.values)])
+        vector = weights @ acceleration.values
+        # A change of zero has no direction: its length is bounded as in the widest one.
+        widest = float(np.sqrt(np.linalg.eigvalsh(bound.covariance)[-1]))
+        along = bound.along(vector) if vector.any() else widest
+        rows.append([*bound.half_width, TWO_SIDED_95 * along])
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
-
-
-def _along(bound: DeltaVBound, vector: Array) -> float:
-    if not vector.any():
-        return TWO_SIDED_95 * float(np.sqrt(np.linalg.eigvalsh(bound.covariance)[-1]))
-    return TWO_SIDED_95 * bound.along(vector)
 
 
 def delta_v_chart(
@@ -382,6 +380,8 @@ def _chart(slug: str, title: str, caption: str, table: pd.DataFrame, unit: str) 
     panels = []
     for column, colour in zip(table.columns, (BLUE, GREEN), strict=True):
         values = np.array([float(total[column]), *(float(table[column][n]) for n in order)])
+        labels = tuple(f"{v:.{digits}f}" for v in values.tolist())
+        at = np.arange(len(values), dtype=np.float64)
         panels.append(
             Panel(
                 "",
@@ -389,19 +389,12 @@ def _chart(slug: str, title: str, caption: str, table: pd.DataFrame, unit: str) 
                 title=f"{column}, {unit}",
                 categories=categories,
                 bars=(
-                    _bars(_SUM, [0], values[:1], BLACK, digits),
-                    _bars(str(column), range(1, len(values)), values[1:], colour, digits),
+                    Bars(_SUM, at[:1], values[:1], BLACK, labels=labels[:1], legend=False),
+                    Bars(str(column), at[1:], values[1:], colour, labels=labels[1:], legend=False),
                 ),
             )
         )
     return Chart(slug, title, caption, f"standard deviation, {unit}", tuple(panels), beside=True)
-
-
-def _bars(name: str, at: Sequence[int] | range, values: object, colour: str, digits: int) -> Bars:
-    ends = np.asarray(values, dtype=np.float64)
-    labels = tuple(f"{v:.{digits}f}" for v in ends.tolist())
-    where = np.array(list(at), dtype=np.float64)
-    return Bars(name, where, ends, colour, labels=labels, legend=False)
 
 
 def _joined(table: pd.DataFrame, most: float) -> pd.DataFrame:

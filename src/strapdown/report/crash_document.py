@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from strapdown import __version__
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.case import CaseResult, ReferenceAnswer
 from strapdown.crash.case_contact import main_event
@@ -26,7 +24,7 @@ from strapdown.report.crash_charts import (
     risk_chart,
     sliding_chart,
 )
-from strapdown.report.crash_outline import Outline, vehicle_outline
+from strapdown.report.crash_outline import vehicle_outline
 from strapdown.report.crash_pictures import (
     Direction,
     MountingPoint,
@@ -66,7 +64,10 @@ from strapdown.report.document import (
     Items,
     KeyFigures,
     Paragraph,
-    blocks,
+    document_of,
+    items_of,
+    listed,
+    paragraph,
     section,
 )
 from strapdown.report.values import (
@@ -118,10 +119,14 @@ def _document(result: CaseResult, name: str) -> Document:
         "reference_name": shown,
     }
     sampled: Any = {"samples": result.samples, "events": events}
-    directions = _directions(main, which)
+    directions = [
+        _direction(main, k, f"event {k + 1}", main=k == which) for k in range(len(main.body))
+    ]
     recorders = _recorders(result)
     around: Any = {"recorders": recorders, "point": point, "point_name": spec.point.name}
     points = _points(result)
+    by_name = {unit.name: unit for unit in result.units}
+    sources = tuple((r.name, r.source) for r in spec.references if r.source)
     happened = any(unit.body for unit in found.answers)
     described = [Paragraph(text) for text in spec.description.split("\n\n") if text.strip()]
     limits = limitations(result)
@@ -135,24 +140,31 @@ def _document(result: CaseResult, name: str) -> Document:
                     *units,
                     k,
                     gravity=spec.options.gravity_m_per_s2,
-                    stated=[s for s in _stated(result, main) if _belongs(main, k, s.span[1])],
+                    stated=_stated(result, k),
                 )
                 for k in range(len(events))
             ),
             sliding_chart(*units, spec.options.peak_window_s) if happened else None,
             points_picture(outline, points) if points else None,
-            None if happened else Paragraph(headline(result)),
+            paragraph(None if happened else headline(result)),
             figures=1,
         ),
         section(
             "direction",
             "Direction of force",
             crash_tables.direction_table(result),
-            *(() if which is None else _dials(outline, directions, which, around)),
-            *(() if which is None else pdof_charts(*units, which)),
-            None
-            if happened
-            else Paragraph("Without an event the direction of force is not defined."),
+            *(
+                ()
+                if which is None
+                else (
+                    pdof_dial(outline, directions, **around),
+                    elevation_dial(outline, directions[which], recorders),
+                    *pdof_charts(*units, which),
+                )
+            ),
+            paragraph(
+                None if happened else "Without an event the direction of force is not defined."
+            ),
             figures=2,
         ),
         section(
@@ -189,17 +201,35 @@ def _document(result: CaseResult, name: str) -> Document:
                 for k, r in enumerate(paths, start=1)
                 if r.path is not None
             ),
-            *_sources(result),
+            Facts(sources) if sources else None,
+            paragraph(None if spec.references else "No reference was given."),
         ),
         section(
             "case",
             "The case",
             *described,
             crash_tables.records_table(result),
-            *_records(result),
+            *(
+                block
+                for record in result.records.values()
+                if (rows := record_facts(record))
+                for block in (Paragraph(f"Metadata of {record.path.name}:"), Facts(rows))
+            ),
             folded=True,
         ),
-        section("signals", "Signals", Paragraph(SIGNALS), *_signals(result), folded=True),
+        section(
+            "signals",
+            "Signals",
+            Paragraph(SIGNALS),
+            *(
+                chart
+                for k, unit in enumerate(found.units)
+                for chart in unit_signals(
+                    by_name[unit.name], found.synchronised.unit(unit.name), unit, k, events
+                )
+            ),
+            folded=True,
+        ),
         section(
             "closure",
             "Closure with the other vehicle" if result.partners else "Contact and deformation",
@@ -227,7 +257,7 @@ def _document(result: CaseResult, name: str) -> Document:
         section(
             "assumptions",
             "Method and assumptions",
-            Items(tuple(("", step) for step in method(result)), numbered=True),
+            items_of((("", step) for step in method(result)), numbered=True),
             Paragraph("Assumptions:"),
             Items(assumptions(result)),
             folded=True,
@@ -262,29 +292,31 @@ def _document(result: CaseResult, name: str) -> Document:
             folded=True,
         ),
     )
-    vehicle = result.spec.vehicle
+    vehicle, place = spec.vehicle, ""
     size = ""
     if not vehicle.outline_m:
         sides = (length_factor() * v for v in (vehicle.length_m, vehicle.width_m))
         size = " × ".join(f"{v:.4g} {length_unit()}" for v in sides).replace(" ", GAP)
     mass = "" if vehicle.mass_kg is None else mass_words(vehicle.mass_kg)
+    if any(spec.point.position_m):
+        there = ", ".join(plain(length_factor() * v, 2) for v in spec.point.position_m)
+        place = f" ({there} {length_unit()} from the origin)"
     facts = (
         ("Case", spec.number),
         ("Vehicle", ", ".join(part for part in (vehicle.name, mass, size) if part)),
-        ("Reference point", spec.point.name + _place(spec.point.position_m)),
+        ("Reference point", spec.point.name + place),
         ("Recorders", ", ".join(u.name for u in result.units)),
         ("Author", spec.author),
-        ("Software", f"strapdown {__version__}"),
     )
     dial = pdof_dial(outline, directions, **around, small=True)
     against = contradictions(result)
     grave = [head for code, head, _ in limits if code in GRAVE]
     others = [head for code, head, _ in limits if code not in GRAVE]
-    return Document(
-        title=spec.title,
-        subtitle="Crash reconstruction from inertial records",
-        facts=tuple((head, text) for head, text in facts if text),
-        front=blocks(
+    return document_of(
+        spec.title,
+        "Crash reconstruction from inertial records",
+        (fact for fact in facts if fact[1]),
+        (
             KeyFigures(
                 key_figures(result),
                 (*((dial,) if directions else ()), path_plan(path, outline, small=True, **seen)),
@@ -294,48 +326,31 @@ def _document(result: CaseResult, name: str) -> Document:
             if grave
             else None,
             Paragraph("These contradict the answer:", "warning") if against else None,
-            Items(against) if against else None,
+            items_of(against),
             Paragraph(f"Limitations: {'; '.join(others)}.", "note") if others else None,
         ),
-        sections=sections,
+        sections,
         footer=spec.number or spec.title,
     )
 
 
-def _signals(result: CaseResult) -> Iterator[Block]:
-    found = result.reconstruction
-    by_name = {unit.name: unit for unit in result.units}
-    for k, unit in enumerate(found.units):
-        there = found.synchronised.unit(unit.name)
-        yield from unit_signals(by_name[unit.name], there, unit, k, found.main.events.events)
-
-
-def _place(position: tuple[float, float, float]) -> str:
-    if not any(position):
-        return ""
-    there = ", ".join(plain(length_factor() * v, 2) for v in position)
-    return f" ({there} {length_unit()} from the origin)"
-
-
-def _records(result: CaseResult) -> Iterator[Block]:
-    for record in result.records.values():
-        rows = record_facts(record)
-        if rows:
-            yield Paragraph(f"Metadata of {record.path.name}:")
-            yield Facts(rows)
-
-
-def _closure(result: CaseResult) -> Iterator[Block | None]:
-    yield crash_tables.closure_table(result)
+def _closure(result: CaseResult) -> tuple[Block | None, ...]:
+    explained: tuple[Block, ...] = ()
     if result.blame is not None:
-        candidates = [one.finding for one in result.blame.candidates]
-        yield Paragraph(
-            "The two do not close. Each of these would explain it, and no other is as likely:"
-            if candidates
-            else "The two do not close, and no single error explains it."
+        candidates = [one.finding.sentence("file") for one in result.blame.candidates]
+        explained = (
+            Paragraph(
+                "The two do not close. Each of these would explain it, and no other is as likely:"
+                if candidates
+                else "The two do not close, and no single error explains it."
+            ),
+            listed(candidates),
         )
-        yield Items(tuple(("", one.sentence("file")) for one in candidates))
-    yield crash_tables.deformation_table(result)
+    return (
+        crash_tables.closure_table(result),
+        *explained,
+        crash_tables.deformation_table(result),
+    )
 
 
 def _agreement(result: CaseResult) -> tuple[Block | None, ...]:
@@ -350,8 +365,8 @@ def _agreement(result: CaseResult) -> tuple[Block | None, ...]:
         crash_tables.turning_table(result),
         differences_chart(comparison, [u.name for u in found.units]),
         accelerations_chart(found.units, found.combined, found.main.events.events),
-        Items(words) if words else None,
-        Paragraph(f"Remedies: {'; '.join(remedies)}.") if remedies else None,
+        items_of(words),
+        paragraph(f"Remedies: {'; '.join(remedies)}." if remedies else None),
     )
 
 
@@ -375,30 +390,21 @@ def _severity(result: CaseResult, which: int | None) -> tuple[Block | None, ...]
     return table, chart, *(Paragraph(remark, "note") for remark in remarks)
 
 
-def _sources(result: CaseResult) -> tuple[Block, ...]:
-    if not result.references:
-        return (Paragraph("No reference was given."),)
-    sources = tuple((r.name, r.source) for r in result.spec.references if r.source)
-    return (Facts(sources),) if sources else ()
-
-
-def _findings(result: CaseResult) -> tuple[Block, ...]:
+def _findings(result: CaseResult) -> tuple[Block | None, ...]:
     comparison = result.reconstruction.comparison
     told = () if comparison is None else comparison.findings
     rows = notes([f for f in result.findings if f not in told], result)
     if not rows:
         more = " What contradicts the answer is on page one." if contradictions(result) else ""
         return (Paragraph(f"No findings from reading and processing the records.{more}"),)
-    told_there = (
-        Paragraph("Differences between recorders are under Consistency of the recorders."),
-    )
+    elsewhere = "Differences between recorders are under Consistency of the recorders."
     return (
         Paragraph(
             "Findings from reading and processing the records, in this order, with remedies. "
             "Those that affect the answers are under Limitations."
         ),
         Items(rows),
-        *(told_there if told else ()),
+        paragraph(elsewhere if told else None),
     )
 
 
@@ -423,10 +429,6 @@ def reference_in_path_axes(path: CrashPath, answer: ReferenceAnswer) -> pd.DataF
     return pd.DataFrame(
         path.positions(at) - errors[NED].to_numpy(), index=errors.index, columns=NED
     )
-
-
-def _directions(main: UnitReconstruction, which: int | None) -> list[Direction]:
-    return [_direction(main, k, f"event {k + 1}", main=k == which) for k in range(len(main.body))]
 
 
 def _direction(unit: UnitReconstruction, k: int, name: str, **more: Any) -> Direction:
@@ -456,14 +458,6 @@ def _recorders(result: CaseResult) -> list[Direction]:
     ]
 
 
-def _dials(
-    outline: Outline, directions: list[Direction], which: int, around: dict[str, Any]
-) -> Iterator[Block]:
-    """Clock face and elevation of the force, with every recorder."""
-    yield pdof_dial(outline, directions, **around)
-    yield elevation_dial(outline, directions[which], around["recorders"])
-
-
 def _points(result: CaseResult) -> list[PointChange]:
     """Change of velocity of every recorder at its own position, over its severest contact."""
     found = []
@@ -488,18 +482,19 @@ def _points(result: CaseResult) -> list[PointChange]:
     return found
 
 
-def _stated(result: CaseResult, main: UnitReconstruction) -> list[ReferenceAnswer]:
-    """Delta-V stated by other sources, at the end of the main event if no time is stated."""
+def _stated(result: CaseResult, event: int) -> list[ReferenceAnswer]:
+    """Delta-V stated by other sources that ends in an event: after its time zero, before the next.
+
+    At the end of the main event if no time is stated.
+    """
+    main = result.reconstruction.main
     if main_event(main) is None:
         return []
+    zeros = [e.time_zero for e in main.events.events]
     return [
         answer
         for answer in result.references
-        if answer.unit == main.name and answer.spec.delta_v_m_per_s is not None
+        if answer.unit == main.name
+        and answer.spec.delta_v_m_per_s is not None
+        and event == max((k for k, zero in enumerate(zeros) if zero <= answer.span[1]), default=0)
     ]
-
-
-def _belongs(main: UnitReconstruction, event: int, at: float) -> bool:
-    """Whether the time zero of this event is the last one before an instant."""
-    zeros = [e.time_zero for e in main.events.events]
-    return event == max((k for k, zero in enumerate(zeros) if zero <= at), default=0)

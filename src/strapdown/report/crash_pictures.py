@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,21 +103,23 @@ def pdof_dial(
     if small:
         height = 2.0 * _TOP + 14.0
     height += _KEY_ROW * len(recorders) + (14.0 if recorders and not small else 0.0)
-    said = [_words(d) for d in (*directions, *recorders)]
+    said = [f"{d.name}: {_where(d)}" for d in (*directions, *recorders)]
     alt = "Direction of force on a clock about the vehicle: " + "; ".join(said or ["no event"])
     out = Drawing(width, height, alt)
     centre = (0.5 * width, _TOP)
     for d in sorted(directions, key=lambda d: d.main):
         _wedge(out, centre, d)
     _clock(out, centre)
-    scale = _scale(outline, point)
+    # Pixels per meter about the point.
+    reach = np.abs(outline.body - np.asarray(point, np.float64)[:2])
+    scale = _CAR * _RADIUS / max(float(np.hypot(*reach.T).max()), 1e-3)
     origin = np.array(centre)
     # Forward is up the page: a heading of -90 deg in axes x right, y down.
     there = outline.placed((0.0, 0.0), -90.0, point)
     pixels = there.mapped(lambda points: origin + scale * points)
     draw_outline(out, pixels, _BODY, 1.4, fill="#e9edf2")
     for d in sorted(directions, key=lambda d: d.main):
-        _arrow(out, centre, outline, point, d)
+        _arrow(out, centre, scale * outline.edge(point, d.horizontal_deg), d)
     _recorders(out, centre, [(d, d.horizontal_deg, d.interval) for d in recorders])
     out.circle(centre, 3.6, "#ffffff", 1.0, fill=INK)
     at = 2.0 * _TOP + 2.0
@@ -125,14 +127,14 @@ def pdof_dial(
     name = shortened(point_name, 160.0, SMALL)
     out.text((23.0, at), f"{name}; the front is up", SMALL, _SOFT)
     if small:
-        _key(out, at + 17.0, [(d, _where(d)) for d in recorders])
+        _key(out, at + 17.0, [(d.number or 0, d.name, _where(d)) for d in recorders])
         return Picture("pdof-front", out.svg(), "Direction of force", _SMALL_CAPTION, alt, 74.0)
     at += 26.0
     if not rows:
         out.text((14.0, at), "no event, no direction of force", 13.0, INK, bold=True)
     for d in rows:
         at = _numbers(out, at, d, len(directions) > 1)
-    _key(out, at, [(d, _where(d)) for d in recorders])
+    _key(out, at, [(d.number or 0, d.name, _where(d)) for d in recorders])
     caption = (
         "Where the force came from, seen from above, in vehicle axes: 0° the front, positive "
         f"clockwise, +90° the right side. The arrow pushes at the {point_name}; wedge and numbers "
@@ -168,16 +170,13 @@ def _recorders(
         _numbered(out, at, d.number or 0)
 
 
-def _key(out: Drawing, at: float, rows: Sequence[tuple[Direction, str]]) -> None:
-    """List the recorders by their numbers below a drawing, with their directions."""
-    for k, (d, words) in enumerate(rows):
-        _row(out, at + _KEY_ROW * k, d.number or 0, d.name, words)
-
-
-def _row(out: Drawing, at: float, number: int, name: str, words: str) -> None:
-    _numbered(out, (14.0, at + 6.0), number)
-    out.text((25.0, at), shortened(name, out.width - 30.0, SMALL), SMALL, INK)
-    out.text((25.0, at + 12.0), shortened(words, out.width - 30.0, SMALL), SMALL, _SOFT)
+def _key(out: Drawing, at: float, rows: Iterable[tuple[int, str, str]]) -> None:
+    """List the recorders below a drawing: their numbers, names and what is said of each."""
+    for number, name, words in rows:
+        _numbered(out, (14.0, at + 6.0), number)
+        out.text((25.0, at), shortened(name, out.width - 30.0, SMALL), SMALL, INK)
+        out.text((25.0, at + 12.0), shortened(words, out.width - 30.0, SMALL), SMALL, _SOFT)
+        at += _KEY_ROW
 
 
 def elevation_dial(
@@ -252,7 +251,8 @@ def elevation_dial(
     where = f"seen {seen}; the {side} is on the {'right' if sign > 0.0 else 'left'}"
     out.text((14.0, 2.0 * _TOP + 2.0), where, SMALL, _SOFT)
     out.text((14.0, 2.0 * _TOP + 22.0), words, 15.0, INK, bold=True)
-    _key(out, 2.0 * _TOP + 46.0, [(d, _elevation_words(d)) for d in recorders])
+    rows = [(d.number or 0, d.name, _elevation_words(d)) for d in recorders]
+    _key(out, 2.0 * _TOP + 46.0, rows)
     caption = (
         "Vertical angle of the force in the axes of the vehicle, in the vertical plane of its "
         "horizontal direction: 0° level, positive from above; wedge and brackets: 95 %."
@@ -357,8 +357,8 @@ def points_picture(outline: Outline, changes: Sequence[PointChange]) -> Picture:
     length = per * step / speed_factor()
     out.line((20.0, at - 14.0), (20.0 + length, at - 14.0), INK, 2.0)
     out.text((26.0 + length, at - 14.0), f"{step:g} {speed_unit()}", SMALL, INK)
-    for k, (one, (name, words)) in enumerate(zip(changes, told, strict=True)):
-        _row(out, at + 8.0 + _KEY_ROW * k, one.unit.number, name, words)
+    rows = zip((one.unit.number for one in changes), *zip(*told, strict=True), strict=True)
+    _key(out, at + 8.0, rows)
     caption = (
         "The vehicle from above with its measuring points. Arrows: change of velocity over the "
         "contact at each point itself, along the axes of the vehicle, with its 95 % ellipse. "
@@ -423,18 +423,10 @@ def _clock(out: Drawing, centre: Point) -> None:
         out.text(place, label, SMALL, _SOFT, anchor=anchor)
 
 
-def _scale(outline: Outline, point: Sequence[float]) -> float:
-    """Pixels per meter about the point."""
-    reach = np.abs(outline.body - np.asarray(point, np.float64)[:2])
-    return _CAR * _RADIUS / max(float(np.hypot(*reach.T).max()), 1e-3)
-
-
-def _arrow(
-    out: Drawing, centre: Point, outline: Outline, point: Sequence[float], d: Direction
-) -> None:
+def _arrow(out: Drawing, centre: Point, edge: float, d: Direction) -> None:
+    """Draw a force to the vehicle's `edge`, pixels from the center."""
     if not math.isfinite(d.horizontal_deg):
         return
-    edge = _scale(outline, point) * outline.edge(point, d.horizontal_deg)
     tip = min(edge + 3.0, 0.60 * _RADIUS)
     tail = (_RING - 0.01) * _RADIUS
     unsure = d.interval is not None and d.interval.undetermined
@@ -451,10 +443,6 @@ def _arrow(
     )
 
 
-def _words(d: Direction) -> str:
-    return f"{d.name}: {_where(d)}"
-
-
 def _where(d: Direction) -> str:
     angle, ends = interval_words(d.horizontal_deg, d.interval)
     if ends == "undetermined":
@@ -467,7 +455,7 @@ def _numbers(out: Drawing, at: float, d: Direction, many: bool) -> float:
     angle, ends = interval_words(d.horizontal_deg, d.interval)
     speed = speed_both(d.delta_v)
     if not d.main:
-        out.text((14.0, at), _words(d), SMALL, _SOFT)
+        out.text((14.0, at), f"{d.name}: {_where(d)}", SMALL, _SOFT)
         out.text((14.0, at + 14.0), f"change of velocity {speed}", SMALL, _SOFT)
         return at + 33.0
     title = f"{d.name}: " if many else ""
@@ -677,11 +665,7 @@ def _points(
         taken.append((x, y))
         _numbered(out, (x, y), unit.number)
     if point is not None:
-        _target(out, view(point))
-
-
-def _target(out: Drawing, at: tuple[float, float]) -> None:
-    out.circle(at, 4.0, "#ffffff", 1.0, fill=INK)
+        out.circle(view(point), 4.0, "#ffffff", 1.0, fill=INK)
 
 
 def _numbered(out: Drawing, at: tuple[float, float], number: int) -> None:
@@ -698,7 +682,7 @@ def _legend(
             out.circle((x, y), 6.0, _SOFT, 1.8, fill="#ffffff")
             words = "origin of the vehicle, from which positions are"
         elif k == 1:
-            _target(out, (x, y))
+            out.circle((x, y), 4.0, "#ffffff", 1.0, fill=INK)
             words = f"{shortened(point_name, 150.0, SMALL)} {_place(point)}"
         else:
             unit = units[k - 2]

@@ -62,6 +62,7 @@ class _Plan:
     areas: list[Array]
     moments: list[_Moment]
     reference: Array | None
+    lines: list[Array]
 
 
 def path_plan(
@@ -102,18 +103,18 @@ def path_plan(
         np.ptp(outline.body, axis=0).max()
     )
     width = whole - _LEFT - 8.0 - (_ENLARGED + 62.0 if short else 0.0)
-    points = np.vstack([*plan.areas, *(c.body for c in cars), *_given(plan)])
+    points = np.vstack([*plan.areas, *(c.body for c in cars), *plan.lines])
     tail = np.empty((0, 2))
     for _ in range(3):
-        view = PlanView.of(np.vstack([points, tail]), names, (_LEFT, _TOP), width, _HEIGHTS)
+        view = PlanFrame.of(np.vstack([points, tail]), names, (_LEFT, _TOP), width, _HEIGHTS)
         arrow = _entry_arrow(plan, outline, point, view.scale)
         tail = np.empty((0, 2)) if arrow is None else arrow
     beside = None
     if short:
         heights = (view.height, max(view.height, 0.7 * _ENLARGED))
-        near = np.vstack([*plan.areas, *_given(plan)])
+        near = np.vstack([*plan.areas, *plan.lines])
         left = _LEFT + width + 62.0
-        beside = PlanView.of(near, names, (left, _TOP), _ENLARGED, heights, 22.0)
+        beside = PlanFrame.of(near, names, (left, _TOP), _ENLARGED, heights, 22.0)
         view = replace(view, height=beside.height)
     legend = _legend_rows(plan, reference_name, whole)
     bottom = _TOP + view.height + _UNDER
@@ -191,16 +192,13 @@ def _plan(path: CrashPath, events: Sequence[CrashEvent], reference: pd.DataFrame
         colour, dash = (INK, "solid") if k == len(named) - 1 else next(between)
         moments.append(_Moment(name, at, place, heading, colour, dash))
     given = None if reference is None else reference[NED[:2]].to_numpy(dtype=np.float64)
-    return _Plan(path, places, envelope(places, block), moments, given)
+    lines = [places] if given is None else [places, given]
+    return _Plan(path, places, envelope(places, block), moments, given, lines)
 
 
 def _box(points: Array, rim: float = 0.0) -> Box:
     (x0, y0), (x1, y1) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
     return x0 - rim, y0 - rim, x1 + rim, y1 + rim
-
-
-def _given(plan: _Plan) -> list[Array]:
-    return [plan.places] if plan.reference is None else [plan.places, plan.reference]
 
 
 def _entry_arrow(
@@ -219,7 +217,7 @@ def _entry_arrow(
     return np.vstack([tip - ahead * _ARROW / scale, tip])
 
 
-def _draw_band(out: Drawing, view: PlanView, plan: _Plan) -> None:
+def _draw_band(out: Drawing, view: PlanFrame, plan: _Plan) -> None:
     """Draw the outer edge of all areas: first each with its edge, then all insides over it."""
     areas = [view.pixels(area) for area in plan.areas]
     for area in areas:
@@ -228,7 +226,7 @@ def _draw_band(out: Drawing, view: PlanView, plan: _Plan) -> None:
         out.shape(area, _BAND, 0.4, fill=_BAND)
 
 
-def _draw_path(out: Drawing, view: PlanView, plan: _Plan, faint: bool) -> None:
+def _draw_path(out: Drawing, view: PlanFrame, plan: _Plan, faint: bool) -> None:
     if plan.reference is not None:
         out.shape(view.pixels(plan.reference), VERMILLION, 1.6, "dash", closed=False)
     pixels = view.pixels(plan.places)
@@ -301,7 +299,7 @@ _FOOT = 18.0
 
 
 @dataclass(frozen=True)
-class PlanView:
+class PlanFrame:
     """Mapping of a level plane to a picture.
 
     Attributes
@@ -339,7 +337,7 @@ class PlanView:
         width: float,
         heights: tuple[float, float],
         margin: float = 14.0,
-    ) -> PlanView:
+    ) -> PlanFrame:
         """The largest view that contains all points.
 
         Parameters
@@ -423,11 +421,6 @@ class PlanView:
         out.line((x, y), (end, y), INK, 2.0)
         for at in (x, end):
             out.line((at, y - 3.5), (at, y + 3.5), INK, 1.4)
-        words = _length_words(length)
+        size, unit = (1e3, "mm") if length < 0.01 else (1e2, "cm") if length < 1.0 else (1.0, "m")
+        words = f"{number(size * length)} {unit}"
         out.text((0.5 * (x + end), y - 9.0), words, SMALL, INK, anchor="middle", halo=True)
-
-
-def _length_words(length: float) -> str:
-    if length < 0.01:
-        return f"{number(1e3 * length)} mm"
-    return f"{number(100 * length)} cm" if length < 1.0 else f"{number(length)} m"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,6 +31,7 @@ from strapdown.report.chart import (
     Line,
     Panel,
     curve,
+    dots,
 )
 from strapdown.report.crash_outline import (
     SINCE_TRIGGER,
@@ -43,6 +44,7 @@ from strapdown.report.crash_outline import (
 from strapdown.report.values import AXES
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.synchronise import SynchronisedUnit
+from strapdown.sensors.unit_clocks import TriadAtStamps
 from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
 from strapdown.tables.checks import index_of
 from strapdown.tables.on_disk import let_go, parts_of
@@ -75,9 +77,9 @@ def unit_signals(
         raise ValueError(f"{unit.name} is a mean of units, which recorded nothing")
     time = np.asarray(prepared.imu.index.to_numpy(), dtype=np.float64)
     span = crash_span(events, float(time[0]), float(time[-1]))
-    about = [_about_the_crash(recorded, synchronised, unit, number, span)]
+    about = [_forces_and_rates(recorded, synchronised, unit, number, span)]
     if synchronised.lender is None and recorded.gyro is not None:
-        about.append(_rates(recorded.gyro, recorded, synchronised, unit, number, span))
+        about.append(_forces_and_rates(recorded, synchronised, unit, number, span, recorded.gyro))
     marks = event_marks(events, *span)
     bands = tuple(Band(1e3 * e.time_zero, 1e3 * e.end, "563 event") for e in events)
     return [
@@ -86,64 +88,69 @@ def unit_signals(
     ]
 
 
-def _about_the_crash(
+def _forces_and_rates(
     recorded: CrashUnit,
     synchronised: SynchronisedUnit,
     unit: UnitReconstruction,
     number: int,
     span: tuple[float, float],
+    gyro: RecordedTriad | None = None,
 ) -> Chart:
-    prepared = unit.at_point.prepared
+    """Specific force of a unit about the crash, or with its gyro the rates: recorded, processed."""
+    prepared, assumed = unit.at_point.prepared, unit.at_point.assumed_axes
     assert prepared is not None
-    g = STANDARD_GRAVITY
+    time, C = index_of(prepared.imu), recorded.mounting.C_vs
+    triads: tuple[RecordedTriad, ...]
+    aligned: tuple[TriadAtStamps | None, ...]
+    if gyro is None:
+        triads, aligned = recorded.accelerometers, synchronised.accelerometers
+        columns, scale, symbol, axes, names = ACCEL, STANDARD_GRAVITY, "g", AXES, AXES
+        processed = "merged, less bias" if len(triads) > 1 else "at the common stamps"
+        cut = flags_in_vehicle_axes(np.asarray(prepared.clipped), C)
+        slug, title = "signals", "specific force about the crash"
+        caption = "Specific force at the recorder. Thin: as recorded; thick: as processed. "
+        told = _told([axis for axis in AXES if axis in assumed])
+    else:
+        triads, aligned = (gyro,), (synchronised.gyro,)
+        columns, scale, symbol, axes, names = GYRO, math.radians(1.0), "deg/s", _ANGLES, _TURNS
+        processed, cut, told = "less bias", np.zeros((time.size, 3), dtype=bool), ""
+        slug, title = "rates", "rates about the crash"
+        caption = (
+            "Rates about the vehicle's axes: roll about forward (right side down is positive), "
+            "pitch about right (nose up), yaw about down (clockwise from above). "
+        )
     rows: list[list[Line]] = [[], [], []]
     levels: list[list[Level]] = [[], [], []]
-    C = recorded.mounting.C_vs
-    for j, triad in enumerate(recorded.accelerometers):
-        there = synchronised.accelerometers[j]
-        at = index_of(there.triad.table)
-        lines = triad_lines(
-            triad,
-            (at, np.asarray(there.clipped)),
-            recorded,
-            synchronised.offset,
-            g,
-            span,
-            _RAW[j % len(_RAW)],
-        )
+    for j, (triad, there) in enumerate(zip(triads, aligned, strict=True)):
+        flags = (time, np.asarray(prepared.gyro_clipped))
+        if there is not None:
+            flags = (index_of(there.triad.table), np.asarray(there.clipped))
+        raw = _RAW[j % len(_RAW)]
+        lines = triad_lines(triad, flags, recorded, synchronised.offset, scale, span, raw)
         for k in range(3):
             rows[k] += lines[k]
-            levels[k] += near_levels(triad, C, lines[k][:1], k, g, "g")
-    time = index_of(prepared.imu)
-    force = prepared.imu[ACCEL].to_numpy(dtype=np.float64) / g
+            levels[k] += near_levels(triad, C, lines[k][:1], k, scale, symbol)
     inside = (time >= span[0]) & (time <= span[1])
-    cut = flags_in_vehicle_axes(np.asarray(prepared.clipped), C) & inside[:, None]
-    look = unit_look(number)
-    name = "merged, less bias" if len(recorded.accelerometers) > 1 else "at the common stamps"
-    assumed = unit.at_point.assumed_axes
+    values, cut = prepared.imu[columns].to_numpy(dtype=np.float64) / scale, cut & inside[:, None]
+    colour, ms = unit_look(number)["colour"], 1e3 * time
     for k in range(3):
-        if AXES[k] in assumed:
-            continue
-        rows[k].append(curve(name, 1e3 * time[inside], force[inside, k], look["colour"], width=2.0))
+        rows[k].append(curve(processed, ms[inside], values[inside, k], colour, width=2.0))
         if cut[:, k].any():
-            x, y = 1e3 * time[cut[:, k]], force[cut[:, k], k]
-            rows[k].append(
-                Line("clipped in every range", x, y, VERMILLION, points=True, symbol="x", size=10.0)
-            )
+            x, y = ms[cut[:, k]], values[cut[:, k], k]
+            rows[k].append(dots("clipped in every range", x, y, VERMILLION, "x", 10.0))
     return Chart(
-        f"signals-{number + 1}",
-        f"{unit.name}: specific force about the crash",
-        "Specific force at the recorder. Thin: as recorded; thick: as processed. "
-        "Shaded: the 49 CFR 563 event." + _told([axis for axis in AXES if axis in assumed]),
+        f"{slug}-{number + 1}",
+        f"{unit.name}: {title}",
+        f"{caption}Shaded: the 49 CFR 563 event.{told}",
         SINCE_TRIGGER,
         tuple(
             Panel(
-                f"{axis}, g",
-                tuple(_once(rows[k])),
+                f"{name}, {symbol}",
+                tuple(line for line in rows[k] if np.isfinite(line.y).any()),
                 levels=tuple(levels[k]),
                 height=0.9,
             )
-            for k, axis in enumerate(AXES)
+            for k, (axis, name) in enumerate(zip(axes, names, strict=True))
             if axis not in assumed
         ),
     )
@@ -154,50 +161,6 @@ def _told(assumed: Sequence[str]) -> str:
     if not assumed:
         return ""
     return f" Assumed instead of recorded, and not drawn: {', '.join(assumed)}."
-
-
-def _once(lines: list[Line]) -> list[Line]:
-    """Lines with finite values."""
-    return [line for line in lines if np.isfinite(line.y).any()]
-
-
-def _rates(
-    gyro: RecordedTriad,
-    recorded: CrashUnit,
-    synchronised: SynchronisedUnit,
-    unit: UnitReconstruction,
-    number: int,
-    span: tuple[float, float],
-) -> Chart:
-    prepared = unit.at_point.prepared
-    assert prepared is not None
-    degree, there = math.radians(1.0), synchronised.gyro
-    assumed = unit.at_point.assumed_axes
-    time = index_of(prepared.imu)
-    flags = (time, np.asarray(prepared.gyro_clipped))
-    if there is not None:
-        flags = (index_of(there.triad.table), np.asarray(there.clipped))
-    C = recorded.mounting.C_vs
-    rows = triad_lines(gyro, flags, recorded, synchronised.offset, degree, span, _RAW[0])
-    levels = [near_levels(gyro, C, rows[k][:1], k, degree, "deg/s") for k in range(3)]
-    inside = (time >= span[0]) & (time <= span[1])
-    rate = prepared.imu[GYRO].to_numpy(dtype=np.float64) / degree
-    for k in range(3):
-        colour = unit_look(number)["colour"]
-        rows[k].append(curve("less bias", 1e3 * time[inside], rate[inside, k], colour, width=2.0))
-    return Chart(
-        f"rates-{number + 1}",
-        f"{unit.name}: rates about the crash",
-        "Rates about the vehicle's axes: roll about forward (right side down is positive), pitch "
-        "about right (nose up), yaw about down (clockwise from above). "
-        "Shaded: the 49 CFR 563 event.",
-        SINCE_TRIGGER,
-        tuple(
-            Panel(f"{turn}, deg/s", tuple(_once(rows[k])), levels=tuple(levels[k]), height=0.9)
-            for k, turn in enumerate(_TURNS)
-            if _ANGLES[k] not in assumed
-        ),
-    )
 
 
 def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent]) -> Chart:
@@ -361,22 +324,22 @@ def place_chart(
         ``north east down`` in the axes of the path, m, indexed by time.
     """
     labels = [f"{name}, m" for name in (*names, "down")]
-    panels = _panels(path, NED, labels, _sampled(samples, 6))
-    if reference is not None:
-        at = 1e3 * index_of(reference)
-        for k, column in enumerate(NED):
-            y = reference[column].to_numpy(dtype=np.float64)
-            line = curve(reference_name, at, y, VERMILLION, "dash", 1.6)
-            panels[k] = replace(panels[k], lines=(*panels[k].lines, line))
-    return _chart(
+    chart = _over_time(
         "position",
-        "Position over time",
         f"Position of the reference point, {names[0]}, {names[1]}, down, from that at the entry, "
         "which is exact by definition.",
-        panels,
-        (path, events),
-        samples,
+        (path, events, samples),
+        dict(zip(NED, labels, strict=True)),
+        _sampled(samples, 6),
     )
+    if reference is None:
+        return chart
+    at, panels = 1e3 * index_of(reference), []
+    for panel, column in zip(chart.panels, NED, strict=True):
+        y = reference[column].to_numpy(dtype=np.float64)
+        line = curve(reference_name, at, y, VERMILLION, "dash", 1.6)
+        panels.append(replace(panel, lines=(*panel.lines, line)))
+    return replace(chart, panels=tuple(panels))
 
 
 def velocity_chart(
@@ -388,14 +351,13 @@ def velocity_chart(
 ) -> Chart:
     """Chart the velocity of the reference point over time; parameters as `place_chart`."""
     labels = [f"{name}, m/s" for name in (*names, "down")]
-    return _chart(
+    return _over_time(
         "velocity",
-        "Velocity over time",
         f"Velocity of the reference point over ground, {names[0]}, {names[1]}, down, in axes that "
         "do not turn with the vehicle.",
-        _panels(path, VELOCITY, labels, _sampled(samples, 3)),
-        (path, events),
-        samples,
+        (path, events, samples),
+        dict(zip(VELOCITY, labels, strict=True)),
+        _sampled(samples, 3),
     )
 
 
@@ -406,15 +368,14 @@ def attitude_chart(
     events: Sequence[CrashEvent] = (),
 ) -> Chart:
     """Chart roll, pitch and heading over time; parameters as `place_chart`."""
-    return _chart(
+    return _over_time(
         "attitude",
-        "Attitude over time",
         "Roll (right side down is positive), pitch (nose up) and heading (clockwise from above), "
         "3-2-1 angles of the vehicle against the axes of the path; the heading continues beyond a "
         "full turn.",
-        _panels(path, EULER, [f"{a}, deg" for a in EULER], _sampled_angles(path, samples)),
-        (path, events),
-        samples,
+        (path, events, samples),
+        {a: f"{a}, deg" for a in EULER},
+        _sampled_angles(path, samples),
     )
 
 
@@ -483,45 +444,41 @@ def _sampled_angles(path: CrashPath, samples: PathSamples | None) -> list[Array]
     return list(out)
 
 
-def _panels(
-    path: CrashPath, columns: Sequence[str], labels: Sequence[str], sampled: list[Array] | None
-) -> list[Panel]:
-    time, sd = 1e3 * path.time, path.sd
-    panels = []
-    for k, (column, label) in enumerate(zip(columns, labels, strict=True)):
+def _over_time(
+    slug: str,
+    caption: str,
+    of: tuple[CrashPath, Sequence[CrashEvent], PathSamples | None],
+    labels: Mapping[str, str],
+    sampled: list[Array] | None,
+) -> Chart:
+    """Columns of a path with both bounds.
+
+    `of`: the path, its events and its Monte Carlo samples. `labels`: of the panels, by column;
+    `sampled`: ends of the interval of each by the samples, relative to it.
+    """
+    path, events, samples = of
+    time, panels = 1e3 * path.time, []
+    for k, (column, label) in enumerate(labels.items()):
         y = path.table[column].to_numpy(dtype=np.float64)
         if column == "heading":
             y = np.unwrap(y, period=360.0)
             # A heading of 359.9 deg at the entry is shown as -0.1 deg.
             y = y - 360.0 * np.round(y[path.anchor] / 360.0)
-        half = TWO_SIDED_95 * sd[column].to_numpy(dtype=np.float64)
+        half = TWO_SIDED_95 * path.sd[column].to_numpy(dtype=np.float64)
         lines = [curve("reconstructed", time, y, BLACK, width=1.8)]
         fill = Fill("95 %, linear", time, y - half, y + half, BLUE)
-        if sampled is not None:
-            for edge in sampled[k]:
-                there = np.isfinite(edge)
-                y_there = (y + edge)[there]
-                lines.append(Line("95 %, Monte Carlo", time[there], y_there, ORANGE, "dash", 1.2))
+        for edge in () if sampled is None else sampled[k]:
+            there = np.isfinite(edge)
+            y_there = (y + edge)[there]
+            lines.append(Line("95 %, Monte Carlo", time[there], y_there, ORANGE, "dash", 1.2))
         panels.append(Panel(label, tuple(lines), fills=(fill,), height=0.8, steady=_STEADY))
-    return panels
-
-
-def _chart(
-    slug: str,
-    title: str,
-    caption: str,
-    panels: list[Panel],
-    when: tuple[CrashPath, Sequence[CrashEvent]],
-    samples: PathSamples | None,
-) -> Chart:
-    path, events = when
     named = [(at, name) for name, at in path_moments(path, events) if name not in ("begin", "end")]
     said = " Shaded: 95 % by the linear covariance"
     if samples is not None:
         said += f"; dashed: central 95 % of {len(samples.errors)} Monte Carlo runs"
     return Chart(
         slug,
-        title,
+        f"{slug.capitalize()} over time",
         f"{caption}{said}.",
         SINCE_TRIGGER,
         tuple(panels),

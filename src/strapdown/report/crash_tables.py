@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,15 +12,13 @@ from strapdown.config.crash_case import TriadSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.case import CaseResult
 from strapdown.crash.case_contact import main_event
-from strapdown.crash.closure import Figure
 from strapdown.crash.delta_v_bound import VelocityChange
 from strapdown.crash.entry import determined
 from strapdown.crash.pdof import AngleInterval, Pdof
 from strapdown.report.crash_words import DEG, DRIVE_QUANTITIES
-from strapdown.report.document import TableBlock
+from strapdown.report.document import TableBlock, table_of
 from strapdown.report.values import (
     GAP,
-    MEAN,
     about,
     axis_names,
     component_words,
@@ -42,7 +41,10 @@ from strapdown.report.values import (
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.tables import NED
-from strapdown.tables.checks import index_of
+from strapdown.tables.checks import Array, index_of
+
+if TYPE_CHECKING:
+    from strapdown.crash.closure import Figure
 
 Row = tuple[str, str, str, str]
 ANGLES = ("roll, deg", "pitch, deg", "heading, deg")
@@ -63,32 +65,22 @@ def answers_table(result: CaseResult) -> TableBlock | None:
                 strong.append(len(rows))
             rows.append(
                 (
-                    recorder(unit, result),
+                    recorder(unit.name, result),
                     f"{k + 1}, {kind.name}",
                     f"{plain(whole.delta_v.start, 4)} to {plain(whole.delta_v.end, 4)}",
                     *component_words(whole),
                     resultant_words(changes.peak),
                 )
             )
-    if not rows:
-        return None
-    ms = 1e3 * result.spec.options.peak_window_s
-    return TableBlock(
-        (
-            "recorder",
-            "event",
-            "contact, s",
-            f"forward, {speed_unit()}",
-            f"right, {speed_unit()}",
-            f"down, {speed_unit()}",
-            f"resultant, {speed_unit()}",
-            f"largest in {ms:.3g} ms, {speed_unit()}",
-        ),
-        tuple(rows),
+    ms, unit_of = 1e3 * result.spec.options.peak_window_s, speed_unit()
+    return table_of(
+        f"recorder | event | contact, s | forward, {unit_of} | right, {unit_of} | down, {unit_of} "
+        f"| resultant, {unit_of} | largest in {ms:.3g} ms, {unit_of}",
+        rows,
+        f"Delta-V of the {result.spec.point.name} in the axes of the vehicle, with 95 % bounds, "
+        "over the contact; a frontal crash has a negative forward component.",
         text=(0, 1, 2),
-        caption=f"Delta-V of the {result.spec.point.name} in the axes of the vehicle, with 95 % "
-        "bounds, over the contact; a frontal crash has a negative forward component.",
-        strong=tuple(strong),
+        strong=strong,
     )
 
 
@@ -109,7 +101,7 @@ def direction_table(result: CaseResult) -> TableBlock | None:
                     path = _over_ground(getattr(ned, window), ground)
                 rows.append(
                     (
-                        recorder(unit, result),
+                        recorder(unit.name, result),
                         f"{k + 1}, {'contact' if window == 'event' else 'largest'}"
                         + (", recorded part" if change.at_least else ""),
                         f"{plain(angle.horizontal_deg, 1)}°" if known else "not determined",
@@ -120,8 +112,6 @@ def direction_table(result: CaseResult) -> TableBlock | None:
                         *path,
                     )
                 )
-    if not rows:
-        return None
     axes = "over ground, azimuth" if ground else "against the entry"
     told = (
         "over ground, from north"
@@ -129,16 +119,14 @@ def direction_table(result: CaseResult) -> TableBlock | None:
         else "in axes that do not turn with the vehicle, from its heading at the entry"
     )
     ms = 1e3 * result.spec.options.peak_window_s
-    return TableBlock(
-        (
-            *("recorder", "window", "horizontal", "95 %", "o'clock"),
-            *("vertical", "95 %", axes, "95 %", "vertical there"),
-        ),
-        tuple(rows),
-        text=(0, 1),
-        caption="Principal direction of force over the contact, and over the "
+    return table_of(
+        "recorder | window | horizontal | 95 % | o'clock "
+        f"| vertical | 95 % | {axes} | 95 % | vertical there",
+        rows,
+        "Principal direction of force over the contact, and over the "
         f"{ms:.3g} ms of the largest change. Horizontal: from the front of the vehicle, clockwise "
         f"from above; vertical: positive from above; {axes} and vertical there: {told}.",
+        text=(0, 1),
     )
 
 
@@ -158,7 +146,7 @@ def _ends(interval: AngleInterval, shift: float = 0.0) -> str:
     return f"{plain(low, 1)}° to {plain(high, 1)}°"
 
 
-def path_table(result: CaseResult) -> TableBlock:
+def path_table(result: CaseResult) -> TableBlock | None:
     """Positions at the end of the path, by every recorder."""
     rows, size = [], length_factor()
     for unit in result.reconstruction.answers:
@@ -168,7 +156,7 @@ def path_table(result: CaseResult) -> TableBlock:
             table["heading"] = float(within_half_turn(table["heading"]))
         rows.append(
             (
-                recorder(unit, result),
+                recorder(unit.name, result),
                 instant(unit.path.time[-1]),
                 *(
                     about(size * float(table[a]), size * TWO_SIDED_95 * float(sd[a]), "")
@@ -180,12 +168,11 @@ def path_table(result: CaseResult) -> TableBlock:
                 ),
             )
         )
-    return TableBlock(
+    return table_of(
         ("recorder", "at", *(f"{name}, {length_unit()}" for name in axis_names(result)), *ANGLES),
-        tuple(rows),
-        text=(0,),
-        caption="Position of the reference point from that at the entry, and attitude, with 95 % "
-        "bounds. " + (OVER_GROUND if over_ground(result) else FROM_THE_ENTRY),
+        rows,
+        "Position of the reference point from that at the entry, and attitude, with 95 % bounds. "
+        + (OVER_GROUND if over_ground(result) else FROM_THE_ENTRY),
     )
 
 
@@ -198,36 +185,33 @@ def budget_table(result: CaseResult) -> TableBlock | None:
     changes = None if number is None else unit.body[number].event.bound.by_contributor
     if changes is not None:
         names += [n for n in changes.index if n not in names]
-    rows: list[tuple[float, tuple[str, ...]]] = []
-    sums = np.zeros(5)
+    variances: dict[str, Array] = {}
     for name in names:
         squares = np.zeros(5)
         if changes is not None and name in changes.index:
             squares[0], squares[1] = (float(changes.loc[name, c]) for c in ("xx", "yy"))
         if name in ends.index:
             squares[2:] = ends.loc[name].to_numpy(dtype=np.float64)
-        sums += squares
-        sizes = np.sqrt(squares)
-        rows.append((float(squares.sum()), (name, *_sizes(sizes))))
-    rows.sort(key=lambda r: -r[0])
-    lines = tuple(cells for _, cells in rows)
-    return TableBlock(
+        variances[name] = squares
+    variances["total"] = np.sum([variances[name] for name in names], axis=0)
+    names.sort(key=lambda name: -float(variances[name].sum()))
+    units = np.repeat([speed_factor(), length_factor()], [2, 3])
+    shown = {name: (np.sqrt(squares) * units).tolist() for name, squares in variances.items()}
+    return table_of(
         (
             "contributor",
             f"delta-V forward, {speed_unit()}",
             f"delta-V right, {speed_unit()}",
             *(f"{name} at the end, {length_unit()}" for name in axis_names(result)),
         ),
-        (*lines, ("total", *_sizes(np.sqrt(sums)))),
-        caption=f"{recorder(unit, result)}: one standard deviation; squares add up to that of the "
+        (
+            (name, *("–" if sd < 5e-4 else plain(sd, 3) for sd in shown[name]))
+            for name in (*names, "total")
+        ),
+        f"{recorder(unit.name, result)}: one standard deviation; squares add up to that of the "
         "total. The 95 % bound is 1.96 times it.",
-        strong=(len(lines),),
+        strong=(len(names),),
     )
-
-
-def _sizes(sizes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[str, ...]:
-    scaled = sizes * np.repeat([speed_factor(), length_factor()], [2, 3])
-    return tuple("–" if s < 5e-4 else plain(float(s), 3) for s in scaled)
 
 
 # Comparison with other recorders, injury-risk models and references.
@@ -256,21 +240,14 @@ def comparison_table(result: CaseResult) -> TableBlock | None:
             )
         )
     start, end = float(comparison.edges[0]), float(comparison.edges[-1])
-    return TableBlock(
-        (
-            "recorders",
-            f"forward, {speed_unit()}",
-            f"right, {speed_unit()}",
-            f"down, {speed_unit()}",
-            "chi-square per degree of freedom",
-            "probability",
-            "consistent",
-        ),
-        tuple(rows),
-        text=(0, 6),
-        caption=f"Difference of the delta-V of two recorders at the {result.spec.point.name}, "
+    return table_of(
+        f"recorders | forward, {speed_unit()} | right, {speed_unit()} | down, {speed_unit()} "
+        "| chi-square per degree of freedom | probability | consistent",
+        rows,
+        f"Difference of the delta-V of two recorders at the {result.spec.point.name}, "
         f"{instant(start)} to {instant(end)}, with its 95 % bound. Probability of a difference as "
         "large or larger by the stated uncertainties.",
+        text=(0, 6),
     )
 
 
@@ -287,16 +264,13 @@ def turning_table(result: CaseResult) -> TableBlock | None:
         told = [about(v, TWO_SIDED_95 * sd, "") for v, sd in ((rate, rate_sd), (angle, angle_sd))]
         rows.append((axis, *told))
     end = instant(float(turned.edges[-1]))
-    return TableBlock(
-        ("about", "rate, deg/s", "turned, deg"),
-        tuple(rows),
-        caption=f"Turning at {end}, by the motion of the recorders against each other, with its "
+    return table_of(
+        "about | rate, deg/s | turned, deg",
+        rows,
+        f"Turning at {end}, by the motion of the recorders against each other, with its "
         "95 % bound. About an axis that they do not show it is the stated assumption. Positive "
         "heading to the right.",
     )
-
-
-_FIGURES = ("quantity", "value", "95 % bound", "unit")
 
 
 def _figure_row(
@@ -308,6 +282,11 @@ def _figure_row(
     return what, f"{more}{value}", f"from {low}" if more else f"{low} to {high}", unit
 
 
+def _figures_table(rows: Iterable[Row | None], caption: str) -> TableBlock:
+    found = tuple(row for row in rows if row is not None)
+    return TableBlock(("quantity", "value", "95 % bound", "unit"), found, (0, 3), caption)
+
+
 def deformation_table(result: CaseResult) -> TableBlock | None:
     """Crush of a vehicle, and its energy of deformation."""
     found = result.deformation
@@ -316,8 +295,8 @@ def deformation_table(result: CaseResult) -> TableBlock | None:
     row, per, per_unit = _figure_row, speed_factor(), speed_unit()
     rows = [
         row(
-            f"crush by {_named(one.unit, result)}, {1e3 * (one.time - one.touch):.0f} ms after the "
-            "first touch",
+            f"crush by {recorder(one.unit, result)}, {1e3 * (one.time - one.touch):.0f} ms "
+            "after the first touch",
             one.depth,
             length_factor(),
             3,
@@ -328,11 +307,9 @@ def deformation_table(result: CaseResult) -> TableBlock | None:
     ]
     rows.append(row("energy from residual crush and stiffness", found.energy, *energy_shown()))
     rows.append(row("energy-equivalent speed from it", found.equivalent_speed, per, 1, per_unit))
-    return TableBlock(
-        _FIGURES,
-        tuple(one for one in rows if one is not None),
-        text=(0, 3),
-        caption="Deformation. The crush is how far the reference point came nearer to the barrier, "
+    return _figures_table(
+        rows,
+        "Deformation. The crush is how far the reference point came nearer to the barrier, "
         "which holds while the front stands there; a part that is folded or sheared off is not in "
         "it. Dynamic crush is larger than the residual one."
         if found.crush
@@ -384,19 +361,15 @@ def closure_table(result: CaseResult) -> TableBlock | None:
     )
     if closure.contradicted:
         tested += " They contradict each other: these bounds do not hold before that is explained."
-    return TableBlock(
-        _FIGURES,
-        tuple(one for one in rows if one is not None),
-        text=(0, 3),
-        caption=f"{first} and {second} together, {'each ' * bool(result.partners)}by its own "
+    return _figures_table(
+        rows,
+        f"{first} and {second} together, {'each ' * bool(result.partners)}by its own "
         f"recorders at its {named}{taken}. {tested}",
     )
 
 
 def indices_table(result: CaseResult) -> TableBlock | None:
     """Indices of the vehicle and of the occupants, each with its standard and bound."""
-    combined = result.reconstruction.combined
-    mean = None if combined is None else combined.name
     rows = []
     for index in result.indices:
         factor = speed_factor() if index.unit == "m/s" else 1.0
@@ -418,7 +391,7 @@ def indices_table(result: CaseResult) -> TableBlock | None:
             detail.append(f"channels {', '.join(index.channels)}")
         rows.append(
             (
-                MEAN if index.of == mean else index.of,
+                recorder(index.of, result),
                 index.name,
                 value,
                 bound,
@@ -427,15 +400,13 @@ def indices_table(result: CaseResult) -> TableBlock | None:
                 "; ".join(detail),
             )
         )
-    if not rows:
-        return None
-    return TableBlock(
-        ("of", "index", "value", "95 % bound", "limit", "standard", "by"),
-        tuple(rows),
-        text=(0, 1, 3, 5, 6),
-        caption=f"Indices of the vehicle at its {result.spec.point.name} in the severest event, "
+    return table_of(
+        "of | index | value | 95 % bound | limit | standard | by",
+        rows,
+        f"Indices of the vehicle at its {result.spec.point.name} in the severest event, "
         "from the common stamps, with the bound by the error budget and the onset; and of "
         "occupants by channels of the records. Limits are of the standard named.",
+        text=(0, 1, 3, 5, 6),
     )
 
 
@@ -464,22 +435,17 @@ def severity_table(result: CaseResult) -> TableBlock | None:
     main = result.reconstruction.main
     kind = main.types[main_event(main) or 0].name
     any_type = not any("crash_type" in answer.model.applies for answer in result.severity)
-    combined = result.reconstruction.combined
-    of = {answer.of for answer in result.severity}.pop()
-    name = MEAN if combined is not None and of == combined.name else of
-    return TableBlock(
-        (
-            *("outcome", "probability", "95 % bound", "the bound is of"),
-            *(("source",) if len(sources) > 1 else ()),
-        ),
-        tuple(rows),
-        text=(0, 2, 3, 4),
-        caption="Probability of at least this injury, by published models, from the resultant "
+    name = recorder({answer.of for answer in result.severity}.pop(), result)
+    return table_of(
+        "outcome | probability | 95 % bound | the bound is of" + " | source" * (len(sources) > 1),
+        rows,
+        "Probability of at least this injury, by published models, from the resultant "
         f"delta-V by {name} at the {result.spec.point.name}. The bound is due to delta-V and, "
         "where the model states their covariance or standard errors, to its coefficients; else it "
         "leaves the uncertainty of the model out."
         + any_type * f" The model is of all types of impact together, not of this one ({kind})."
         + (f" Source: {sources[0]}" if len(sources) == 1 else ""),
+        text=(0, 2, 3, 4),
     )
 
 
@@ -489,7 +455,7 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
     paths: list[tuple[str, ...]] = []
     for answer in result.references:
         spec, verdict = answer.spec, "yes" if answer.consistent else "NO"
-        who = (spec.name, _named(answer.unit, result))
+        who = (spec.name, recorder(answer.unit, result))
         if answer.path is not None:
             errors = [length_factor() * v for v in (*answer.path.rms, *answer.path.largest)]
             paths.append((*who, *(plain(float(v), 3) for v in errors), verdict))
@@ -507,34 +473,27 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
         )
     names = axis_names(result)
     tables = (
-        TableBlock(
-            (
-                *("reference", "recorder", "delta-V"),
-                *(
-                    f"{name}, {speed_unit()}"
-                    for name in ("this report", "reference", "difference (95 %)")
-                ),
-                "consistent",
-            ),
-            tuple(changes),
+        table_of(
+            f"reference | recorder | delta-V | this report, {speed_unit()} | reference, "
+            f"{speed_unit()} | difference (95 %), {speed_unit()} | consistent",
+            changes,
+            "Delta-V of this report less that of a reference. The 95 % bound of the difference "
+            "holds the bounds of both, and neither alone decides." + "".join(_force_words(result)),
             text=(0, 1, 2, 6),
-            caption="Delta-V of this report less that of a reference. The 95 % bound of the "
-            "difference holds the bounds of both, and neither alone decides."
-            + "".join(_force_words(result)),
         ),
-        TableBlock(
+        table_of(
             (
                 *("reference", "recorder"),
                 *(f"{name}, RMS, {length_unit()}" for name in names),
                 *(f"{name}, largest, {length_unit()}" for name in names),
                 "consistent",
             ),
-            tuple(paths),
+            paths,
+            "Errors of the path: this report − reference.",
             text=(0, 1, 8),
-            caption="Errors of the path: this report − reference.",
         ),
     )
-    return tuple(table for table in tables if table.rows)
+    return tuple(table for table in tables if table is not None)
 
 
 def _force_words(result: CaseResult) -> Iterator[str]:
@@ -559,15 +518,10 @@ def _force_words(result: CaseResult) -> Iterator[str]:
                 )
 
 
-def _named(unit: str, result: CaseResult) -> str:
-    combined = result.reconstruction.combined
-    return MEAN if combined is not None and unit == combined.name else unit
-
-
 # Inputs of a crash report: records, recorders, sensors, files.
 
 
-def records_table(result: CaseResult) -> TableBlock:
+def records_table(result: CaseResult) -> TableBlock | None:
     """Return the channels taken from each record, and their recorder."""
     rows = []
     for spec, unit in zip(result.spec.units, result.units, strict=True):
@@ -576,11 +530,11 @@ def records_table(result: CaseResult) -> TableBlock:
             rows.append(_taken(result, unit.name, name, triad_spec, triad))
         if spec.gyro is not None and unit.gyro is not None:
             rows.append(_taken(result, unit.name, "gyro", spec.gyro, unit.gyro))
-    return TableBlock(
-        ("recorder", "sensors", "record", "format", "channels", "samples", "rate, Hz", "from, to"),
-        tuple(rows),
+    return table_of(
+        "recorder | sensors | record | format | channels | samples | rate, Hz | from, to",
+        rows,
+        "Channels of each record along the axes x, y, z of the recorder, on its own clock.",
         text=(0, 1, 2, 3, 4, 7),
-        caption="Channels of each record along the axes x, y, z of the recorder, on its own clock.",
     )
 
 
@@ -609,7 +563,7 @@ def _rate(triad: RecordedTriad) -> str:
     return f"{round(rate):d}" if rate >= 1000.0 else f"{rate:.4g}"
 
 
-def units_table(result: CaseResult) -> TableBlock:
+def units_table(result: CaseResult) -> TableBlock | None:
     """Mounting position and clock synchronization of each recorder."""
     rows, size = [], length_factor()
     for unit, at in zip(result.units, result.reconstruction.synchronised.units, strict=True):
@@ -627,20 +581,13 @@ def units_table(result: CaseResult) -> TableBlock:
                 unit.gyro_from or ("own" if unit.gyro is not None else "none: assumed"),
             )
         )
-    return TableBlock(
-        (
-            "recorder",
-            f"forward right down, {length_unit()}",
-            "roll pitch heading, deg",
-            "trigger on its clock",
-            "± ms",
-            "clock",
-            "gyro",
-        ),
-        tuple(rows),
-        text=(0, 1, 2, 5, 6),
-        caption="Mounting positions from the vehicle's origin; angles turn vehicle axes into the "
+    return table_of(
+        f"recorder | forward right down, {length_unit()} | roll pitch heading, deg "
+        "| trigger on its clock | ± ms | clock | gyro",
+        rows,
+        "Mounting positions from the vehicle's origin; angles turn vehicle axes into the "
         "recorder's. 95 % bounds.",
+        text=(0, 1, 2, 5, 6),
     )
 
 
@@ -662,7 +609,7 @@ def drive_table(result: CaseResult) -> TableBlock | None:
             of_wheels = what["quantity"].startswith("speed")
             rows.append(
                 (
-                    recorder(unit, result),
+                    recorder(unit.name, result),
                     ": ".join((what["of"], name)),
                     about(what["error"] / size, half, symbol),
                     f"± {stated:.2g} {symbol}",
@@ -677,14 +624,13 @@ def drive_table(result: CaseResult) -> TableBlock | None:
         tuple(rows),
         text=(0, 1),
         title="The drive before the crash",
-        caption="Errors of the sensors (measured − true), of the wheels (with "
-        "their delay) and of the stated mounting angles, positive as these; "
-        "95 % bounds. All are corrected. Ranges that the drive did not "
-        "reach, and nonlinearity, are as stated." + left,
+        caption="Errors of the sensors (measured − true), of the wheels (with their delay) and of "
+        "the stated mounting angles, positive as these; 95 % bounds. All are corrected. Ranges "
+        "that the drive did not reach, and nonlinearity, are as stated." + left,
     )
 
 
-def sensors_table(result: CaseResult) -> TableBlock:
+def sensors_table(result: CaseResult) -> TableBlock | None:
     """Stated properties of each sensor triad."""
     rows = []
     for spec, unit in zip(result.spec.units, result.units, strict=True):
@@ -692,22 +638,13 @@ def sensors_table(result: CaseResult) -> TableBlock:
             rows.append(_sensor(unit.name, triad_spec.sensor, triad, STANDARD_GRAVITY, "g"))
         if spec.gyro is not None and unit.gyro is not None:
             rows.append(_sensor(unit.name, spec.gyro.sensor, unit.gyro, 1.0 / DEG, "°/s"))
-    return TableBlock(
-        (
-            "recorder",
-            "triad",
-            "sensor",
-            "rate, Hz",
-            "range, ±",
-            "bias",
-            "scale, %",
-            "misalignment, mrad",
-            "noise of a sample",
-        ),
-        tuple(rows),
+    return table_of(
+        "recorder | triad | sensor | rate, Hz | range, ± | bias | scale, % | misalignment, mrad "
+        "| noise of a sample",
+        rows,
+        "Standard deviations as stated in the case or by data sheets, before calibration at rest; "
+        "the largest of the three axes.",
         text=(0, 1, 2),
-        caption="Standard deviations as stated in the case or by data sheets, before calibration "
-        "at rest; the largest of the three axes.",
     )
 
 
@@ -730,15 +667,12 @@ def _sensor(
     )
 
 
-def inputs_table(result: CaseResult) -> TableBlock:
+def inputs_table(result: CaseResult) -> TableBlock | None:
     """Return the input files of the report."""
-    rows = []
-    for item in result.inputs:
-        for file, digest in zip(item.files, item.digests, strict=True):
-            rows.append((item.role, file.name, digest))
-    return TableBlock(
-        ("role", "file", "SHA-256"),
-        tuple(rows),
-        text=(0, 1, 2),
-        caption="Copies are in the folder of the report under inputs/.",
-    )
+    rows = [
+        (item.role, file.name, digest)
+        for item in result.inputs
+        for file, digest in zip(item.files, item.digests, strict=True)
+    ]
+    caption = "Copies are in the folder of the report under inputs/."
+    return table_of("role | file | SHA-256", rows, caption, text=(0, 1, 2))

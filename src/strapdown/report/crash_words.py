@@ -12,8 +12,6 @@ import numpy as np
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.case import CaseResult
 from strapdown.crash.case_contact import OF_DRIVES, main_event
-from strapdown.crash.closure import Closure
-from strapdown.crash.contact import Edge
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import VelocityChange
 from strapdown.crash.measuring_point import MISSING_AXIS, NO_TURNING, TURNED_AXIS
@@ -49,6 +47,7 @@ from strapdown.sensors.pre_crash import PreparedUnit
 from strapdown.tables import NED, VELOCITY
 
 if TYPE_CHECKING:
+    from strapdown.crash.closure import Closure
     from strapdown.report.document import KeyFigure
 
 TYPES = {
@@ -131,13 +130,16 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
         changes = unit.body[number]
         whole, peak = changes.event, changes.peak
         ms = 1e3 * (peak.delta_v.end - peak.delta_v.start)
+        begin, end = (
+            about(edge.time, TWO_SIDED_95 * edge.sd, "s")
+            for edge in (changes.contact.start, changes.contact.end)
+        )
         figures.append(
             KeyFigure(
                 "Delta-V",
                 change_words(whole),
                 change_range(whole),
-                f"over the contact, {_edge_words(changes.contact.start)} to "
-                f"{_edge_words(changes.contact.end)}; largest in {ms:.3g} ms {change_words(peak)}",
+                f"over the contact, {begin} to {end}; largest in {ms:.3g} ms {change_words(peak)}",
             )
         )
         across = whole.interval.horizontal
@@ -212,11 +214,6 @@ def lead(result: CaseResult) -> str:
         assumption_words(result),
     ]
     return " ".join(p for p in parts if p)
-
-
-def _edge_words(edge: Edge) -> str:
-    """Return onset or end of a contact with its bound."""
-    return about(edge.time, TWO_SIDED_95 * edge.sd, "s")
 
 
 def windows_words(unit: UnitReconstruction, number: int) -> str:
@@ -694,85 +691,76 @@ def not_shown(result: CaseResult) -> tuple[tuple[str, str], ...]:
     unit = made.main
     begin, end = unit.acceleration.begin, unit.acceleration.end
     assumed_axes = list(dict.fromkeys(a for u in made.units for a in u.at_point.assumed_axes))
-    others, barrier = bool(result.partners), spec.vehicle.against == "barrier"
-    rows = [
+    barrier = spec.vehicle.against == "barrier"
+    several, rate = len(made.units) > 1, spec.options.rate_hz
+    rows = (
         (
+            True,
             "Before and after the records",
             f"They cover {instant(begin)} to {instant(end)} from the trigger; what the vehicle did "
             "before and after is in no answer and in no bound.",
         ),
         (
+            True,
             "The cause",
             "Who steered, braked or gave way, visibility, the road and its grip are not in an "
             "acceleration.",
         ),
         (
+            True,
             "The people",
             "Indices are those of dummies or of a model occupant, and a probability of injury is "
             "that of many crashes of this severity: neither says how this person was injured.",
         ),
         (
+            True,
             "Deformation that all recorders share",
             "A recorder has the motion of its mounting. Where all mountings were pushed in with "
             "the structure, their agreement does not show it.",
         ),
-    ]
-    if spec.entry.kind == "speed":
-        rows.append(
-            (
-                "The speed before the impact",
-                "It is stated, not measured by these records; delta-V is the change alone.",
-            )
-        )
-    if not over_ground(result):
-        rows.append(
-            (
-                "The place on the road",
-                "Without a stated heading the path is relative to the vehicle at the entry; where "
-                "on the road it lies is not known.",
-            )
-        )
-    if not others:
-        rows.append(
-            (
-                "The other vehicle or obstacle",
-                "Its mass, speed, stiffness and change of velocity are not known from these "
-                f"records{'' if barrier else '; a closing speed needs its case as well'}.",
-            )
-        )
-    if assumed_axes:
-        rows.append(
-            (
-                "Axes that were not measured",
-                f"{', '.join(assumed_axes)}: an impact or a turn along them appears only as the "
-                "bound that was assumed.",
-            )
-        )
-    if len(made.units) == 1:
-        rows.append(
-            (
-                "An error of the one recorder",
-                "A wrong sign, axis, scale factor or clock, or a loose bracket, looks like another "
-                "crash.",
-            )
-        )
-    else:
-        rows.append(
-            (
-                "Errors that the recorders share",
-                "The same wrong angle, lever arm or trigger in every recorder moves all answers "
-                "together, and their comparison does not see it.",
-            )
-        )
-    rate = spec.options.rate_hz
-    rows.append(
         (
+            spec.entry.kind == "speed",
+            "The speed before the impact",
+            "It is stated, not measured by these records; delta-V is the change alone.",
+        ),
+        (
+            not over_ground(result),
+            "The place on the road",
+            "Without a stated heading the path is relative to the vehicle at the entry; where on "
+            "the road it lies is not known.",
+        ),
+        (
+            not result.partners,
+            "The other vehicle or obstacle",
+            "Its mass, speed, stiffness and change of velocity are not known from these "
+            f"records{'' if barrier else '; a closing speed needs its case as well'}.",
+        ),
+        (
+            bool(assumed_axes),
+            "Axes that were not measured",
+            f"{', '.join(assumed_axes)}: an impact or a turn along them appears only as the bound "
+            "that was assumed.",
+        ),
+        (
+            not several,
+            "An error of the one recorder",
+            "A wrong sign, axis, scale factor or clock, or a loose bracket, looks like another "
+            "crash.",
+        ),
+        (
+            several,
+            "Errors that the recorders share",
+            "The same wrong angle, lever arm or trigger in every recorder moves all answers "
+            "together, and their comparison does not see it.",
+        ),
+        (
+            True,
             "Fast motion",
             f"Answers are at {rate:g} Hz: motion above {rate / 2.0:g} Hz, such as ringing of the "
             "structure, is in their sum and not in their shape.",
-        )
+        ),
     )
-    return tuple(rows)
+    return tuple((head, text) for applies, head, text in rows if applies)
 
 
 # Limitations of the answers of a case, from its own events, most serious first.

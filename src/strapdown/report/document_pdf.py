@@ -174,12 +174,11 @@ def shown(text: str) -> str:
     """
     if text.isascii():
         return text
-    return _BEYOND.sub(_told, _ONE_FORM.sub("", text))
-
-
-def _told(letter: re.Match[str]) -> str:
-    char = letter[0]
-    return char if ord(char) in _known() else f"[U+{ord(char):04X}]"
+    known = _known()
+    return _BEYOND.sub(
+        lambda char: char[0] if ord(char[0]) in known else f"[U+{ord(char[0]):04X}]",
+        _ONE_FORM.sub("", text),
+    )
 
 
 @cache

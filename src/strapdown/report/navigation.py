@@ -23,7 +23,6 @@ from strapdown.lazy_names import Choices
 from strapdown.navigation.consistency import Inconsistency
 from strapdown.navigation.heading_integrity import REASONS, STATUSES
 from strapdown.navigation.integrity import QUANTITY_REASONS, Repeated
-from strapdown.navigation.outage_test import judge_outages
 from strapdown.navigation.record import NavigationRecord
 from strapdown.progress import Progress
 from strapdown.report.chart import Array
@@ -40,7 +39,6 @@ from strapdown.report.navigation_evaluation import (
     rms,
     trust,
 )
-from strapdown.report.paired_corrections import paired_json, write_paired
 from strapdown.report.report_bundle import (
     ReportBundle,
     alignment_data,
@@ -239,25 +237,7 @@ def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
             }
             for aid, span, bound in evaluation.outages
         ],
-        "gnss_outage_tests": [
-            {
-                "measurement": withheld_aid(result.spec),
-                "from_s": w.result.span.begin,
-                "to_s": w.result.span.end,
-                "largest_horizontal_error_m": w.result.largest,
-                "bound_95_m": w.result.bound_at_largest,
-                "against": w.result.against,
-                "instants": len(w.result.time),
-                "share_inside": float(w.result.inside.mean()),
-                "probability": verdict.probability,
-                "inside": verdict.consistent,
-                "largest_horizontal_error_forward_m": None
-                if w.smoothed is None
-                else w.forward.largest,
-            }
-            for w in result.withheld
-            for verdict in (judge_outages([w.result]),)
-        ],
+        "gnss_outage_tests": _outage_tests(result) if result.withheld else [],
         "modes": [{"mode": s.name, "from_s": s.begin, "to_s": s.end} for s in record.modes],
         "events": [
             {"time_s": e.time, "kind": e.kind, "what": e.finding.what} for e in record.events
@@ -275,11 +255,40 @@ def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
             "largest_at_s": points.largest_at,
             "turn_deg": points.turn_deg,
         },
-        "paired": paired_json(evaluation),
+        "paired": _paired(evaluation) if evaluation.pair else None,
         "method": _method(result),
         "findings": [f.plain("file") for f in result.findings],
     }
     return finite(data)
+
+
+def _paired(evaluation: NavigationEvaluation) -> dict[str, Any]:
+    from strapdown.report.paired_corrections import paired_json
+
+    return paired_json(evaluation)
+
+
+def _outage_tests(result: NavigationRun) -> list[dict[str, Any]]:
+    """Return each test by withheld fixes: the error at their end beside its bound."""
+    from strapdown.navigation.outage_test import judge_outages
+
+    return [
+        {
+            "measurement": withheld_aid(result.spec),
+            "from_s": w.result.span.begin,
+            "to_s": w.result.span.end,
+            "largest_horizontal_error_m": w.result.largest,
+            "bound_95_m": w.result.bound_at_largest,
+            "against": w.result.against,
+            "instants": len(w.result.time),
+            "share_inside": float(w.result.inside.mean()),
+            "probability": verdict.probability,
+            "inside": verdict.consistent,
+            "largest_horizontal_error_forward_m": None if w.smoothed is None else w.forward.largest,
+        }
+        for w in result.withheld
+        for verdict in (judge_outages([w.result]),)
+    ]
 
 
 def _method(result: NavigationRun) -> dict[str, Any]:
@@ -419,7 +428,10 @@ def write_navigation_files(evaluation: NavigationEvaluation, folder: Path) -> No
         )
         against = {**comments, "against": result.source.truth_name, "sign": "computed minus truth"}
         write_table(errors, folder / "errors.csv", against)
-    write_paired(evaluation, folder, comments)
+    if evaluation.pair:
+        from strapdown.report.paired_corrections import write_paired
+
+        write_paired(evaluation, folder, comments)
 
 
 def _write_states(

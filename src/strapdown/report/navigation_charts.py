@@ -313,7 +313,12 @@ def strip(record: NavigationRecord, statuses: tuple[Span, ...] = ()) -> Panel | 
         fills.append(bar("used", used, at, 0.3, GREEN))
         if out:
             fills.append(bar("outage", out, at, 0.13, VERMILLION))
-        lost = _distinct(_joined([rejected_times(table) for table in tables[aid]]), whole)
+        lost = _joined([rejected_times(table) for table in tables[aid]])
+        cell = (whole.end - whole.begin) / _MOST_MARKS
+        if lost.size > _MOST_MARKS and cell > 0.0:
+            # As many as can be distinguished.
+            _, first = np.unique(np.floor((lost - whole.begin) / cell), return_index=True)
+            lost = lost[first]
         if lost.size:
             lines.append(dots("rejected", lost, np.full(lost.size, at), VERMILLION, "x", 6.0))
     if statuses:
@@ -341,15 +346,6 @@ def strip(record: NavigationRecord, statuses: tuple[Span, ...] = ()) -> Panel | 
 
 def _joined(times: list[Array]) -> Array:
     return np.unique(np.concatenate(times)) if times else np.empty(0)
-
-
-def _distinct(times: Array, whole: Span) -> Array:
-    """Times, thinned to as many as can be distinguished."""
-    cell = (whole.end - whole.begin) / _MOST_MARKS
-    if times.size <= _MOST_MARKS or cell <= 0.0:
-        return times
-    _, first = np.unique(np.floor((times - whole.begin) / cell), return_index=True)
-    return times[first]
 
 
 def _stretches(time: Array, whole: Span) -> tuple[Span, ...]:

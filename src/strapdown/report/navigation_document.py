@@ -9,7 +9,6 @@ import numpy as np
 from strapdown.config.choice import ChoiceSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.evaluation.trajectory_differences import trajectory_differences
-from strapdown.navigation.outage_test import judge_outages
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.truth_comparison import SmootherConsistency
 from strapdown.report.chart import AXIS_COLOURS, BLUE, GREY, Array, Chart, Panel, curve, thin_fill
@@ -40,7 +39,6 @@ from strapdown.report.navigation_evaluation import (
     state_groups,
     trust,
 )
-from strapdown.report.paired_corrections import paired_chart, paired_table
 from strapdown.report.values import (
     GAP,
     NOT_ESTIMATED,
@@ -70,11 +68,13 @@ _NO_HEADING = 180.0
 def headline(evaluation: NavigationEvaluation) -> str:
     """Return the end position, the distance traveled, and the bounds."""
     record, arm = evaluation.record, without_arm(evaluation.run)
+    bound = half(record.sd["heading"].iloc[-1])
+    said = "unknown" if bound >= _NO_HEADING else plus_minus(bound, "°").removeprefix(f"±{GAP}")
     return (
         f"Ended at {position_words(evaluation)} after {duration_words(_duration(evaluation))} and "
         f"{length_words(distance_over_ground(record.trajectory))}; 95 % bounds: position "
         f"{length_words(float(evaluation.bounds[-1]))}{f' ({arm})' if arm else ''}, "
-        f"heading {_heading(evaluation)}."
+        f"heading {said}."
     )
 
 
@@ -163,7 +163,7 @@ def cautions(
     evaluation: NavigationEvaluation, *, brief: bool = False
 ) -> tuple[tuple[str, str], ...]:
     """Return the cautions, each with its number; brief, without those that the tables show."""
-    shown = () if brief else (*_memory(evaluation), *_refused(evaluation), *_not_told(evaluation))
+    shown = () if brief else _of_tables(evaluation)
     end = float(evaluation.record.trajectory.index[-1])
     late = [(a, s) for a, s, _ in longest_outages(evaluation) if s.end >= end - 1e-6]
     return (
@@ -212,8 +212,9 @@ def _heading_caution(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
     return [(f"The heading {how}", text)]
 
 
-def _memory(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
-    return [
+def _of_tables(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
+    """Cautions that tables show as well: innovations, and states whose bounds hardly decreased."""
+    out = [
         (
             f"Innovations of {one.name} are correlated",
             f"lag 1: {plain(one.correlation, 2)}; 95 % limit {plain(one.correlation_bound, 2)}. "
@@ -223,15 +224,14 @@ def _memory(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
         for one in evaluation.agreements
         if one.remembers
     ]
-
-
-def _refused(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
-    rows = [
+    rejected = [
         f"{one.rejected} of {one.epochs} epochs of {one.name}"
         for one in evaluation.agreements
         if one.rejected
     ]
-    return [("Rejected", f"{', '.join(rows)}; shown as crosses.")] if rows else []
+    if rejected:
+        out.append(("Rejected", f"{', '.join(rejected)}; shown as crosses."))
+    return [*out, *_not_told(evaluation)]
 
 
 def _not_told(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
@@ -243,11 +243,6 @@ def _not_told(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
             names.append(f"{block.name} {some}" if len(block.labels) > 1 else block.name)
     text = f"bound reduced by less than {plain(100.0 * FELL, 0)}{GAP}%: {'; '.join(names)}."
     return [("Not observable in this run", text)] if names else []
-
-
-def _heading(evaluation: NavigationEvaluation) -> str:
-    bound = half(evaluation.record.sd["heading"].iloc[-1])
-    return "unknown" if bound >= _NO_HEADING else plus_minus(bound, "°").removeprefix(f"±{GAP}")
 
 
 def _duration(evaluation: NavigationEvaluation) -> float:
@@ -514,6 +509,10 @@ def outage_table(evaluation: NavigationEvaluation) -> TableBlock | None:
 def withheld_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """GNSS outage tests with the resulting errors."""
     tests = evaluation.run.withheld
+    if not tests:
+        return None
+    from strapdown.navigation.outage_test import judge_outages
+
     verdicts = [judge_outages([w.result]) for w in tests]
     rows = [
         (
@@ -630,7 +629,13 @@ def navigation_document(evaluation: NavigationEvaluation, name: str) -> Document
         *charts.error_charts(evaluation),
         charts.nees_chart(evaluation),
     )
-    findings = evaluation.all_findings
+    pair: tuple[Block | None, ...] = ()
+    if evaluation.pair:
+        from strapdown.report.paired_corrections import paired_chart, paired_table
+
+        pair = paired_table(evaluation), paired_chart(evaluation)
+    compared = () if evaluation.errors is None else evaluation.errors.findings
+    findings = (*run.findings, *compared)
     sections = (
         section("answer", "The answer", end_table(evaluation), *verdict.blocks),
         *integrity_sections(evaluation),
@@ -639,8 +644,7 @@ def navigation_document(evaluation: NavigationEvaluation, name: str) -> Document
         section(
             "paired",
             "With two corrections of the estimated errors",
-            paired_table(evaluation),
-            paired_chart(evaluation),
+            *pair,
         ),
         # Errors matter more than the state, where they are known.
         *((errors, states) if errors.blocks else (states,)),

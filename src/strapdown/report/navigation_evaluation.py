@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -16,14 +17,11 @@ from strapdown.dsp.chi_square import chi_square_exceeded, plane_bound
 from strapdown.dsp.samples import true_runs
 from strapdown.errors import Finding
 from strapdown.estimation.robust import AdaptiveScale
-from strapdown.evaluation.trajectory_differences import trajectory_differences
-from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.consistency import (
     ObservationConsistency,
     consistency_of,
 )
 from strapdown.navigation.measurements.measurement import lasting
-from strapdown.navigation.outage_test import judge_outages
 from strapdown.navigation.record import NavigationRecord, Span, innovation_labels
 from strapdown.navigation.truth_comparison import (
     SmootherConsistency,
@@ -36,9 +34,12 @@ from strapdown.report.chart import Array
 from strapdown.report.document import Trust, reason
 from strapdown.report.values import shown_unit
 from strapdown.systems.navigation_run import NavigationRun
-from strapdown.tables import EULER, GEODETIC, VELOCITY
+from strapdown.tables import EULER
 from strapdown.tables.checks import index_of, values_of, view_of
 from strapdown.tables.on_disk import let_go, let_go_of_all, parts_of
+
+if TYPE_CHECKING:
+    from strapdown.report.paired_corrections import HorizontalErrors
 
 #: A smaller relative reduction of a bound means that the motion made the state not observable.
 FELL = 0.1
@@ -84,8 +85,21 @@ class NavigationEvaluation:
 
     @cached_property
     def states(self) -> tuple[ShownStates, ...]:
-        """Sensor and measurement error states of the filter, for display."""
-        return blocks_of(self.run.filtered)
+        """Sensor and measurement error states of the filter, for display, in their order."""
+        out, record = [], self.run.filtered
+        for name, columns in state_groups(record).items():
+            labels = [c.removeprefix(name).lstrip("_") for c in columns]
+            # The unit must suit both the estimates and their standard deviations.
+            sizes = [view_of(table, columns) for table in (record.sensors, record.sensors_sd)]
+            size = max((float(np.nanmax(np.abs(v))) for v in sizes if v.size), default=0.0)
+            let_go_of_all()
+            factor, unit = shown_unit(record.units.get(columns[0], ""), size)
+            aid, dot, own = name.rpartition(".")
+            words = own.replace("_", " ")
+            words = f"{aid}: {words}" if dot else words.replace("accel ", "accelerometer ")
+            slug = name.replace("_", "-").replace(".", "-")
+            out.append(ShownStates(words, slug, tuple(columns), tuple(labels), unit, factor))
+        return tuple(out)
 
     def unobserved(self, block: ShownStates) -> tuple[str, ...]:
         """Labels of the states of a block whose bounds hardly decreased in the run."""
@@ -123,14 +137,12 @@ class NavigationEvaluation:
 
     @cached_property
     def pair(self) -> tuple[HorizontalErrors, ...]:
-        """Errors of the run and of the one with the other correction."""
-        return paired_errors(self.run)
+        """Errors of the run and of the one with the other correction; empty without a second."""
+        if self.run.beside is None:
+            return ()
+        from strapdown.report.paired_corrections import paired_errors
 
-    @property
-    def all_findings(self) -> tuple[Finding, ...]:
-        """Findings of the run and of its comparison with the truth."""
-        more = () if self.errors is None else self.errors.findings
-        return (*self.run.findings, *more)
+        return paired_errors(self.run)
 
     def _errors(self, record: NavigationRecord) -> TruthComparison | None:
         truth = self.run.source.truth
@@ -328,90 +340,6 @@ def _agreement(name: str, table: pd.DataFrame, stated: bool) -> Agreement:
     )
 
 
-# A record navigated twice, with two corrections of the estimated errors: errors of both.
-
-
-@dataclass(frozen=True, eq=False)
-class HorizontalErrors:
-    """Horizontal errors of one of the two solutions.
-
-    Attributes
-    ----------
-    kind : str
-        Of `DAMPINGS`.
-    time : ndarray, (n,), s
-    velocity, position : ndarray, (n,), m/s and m
-        Lengths of the errors; NaN where the reference has none.
-    velocity_sd, position_sd : ndarray, (n,), m/s and m
-        Stated: root of the sum of both variances.
-    """
-
-    kind: str
-    time: Array
-    velocity: Array
-    position: Array
-    velocity_sd: Array
-    position_sd: Array
-
-
-def reference_words(result: NavigationRun) -> str:
-    """Return what the errors are relative to."""
-    if result.source.truth is not None:
-        return result.source.truth_name or "the truth"
-    return f"the fixes of {name}" if (name := _receiver(result)) else ""
-
-
-def paired_errors(result: NavigationRun) -> tuple[HorizontalErrors, ...]:
-    """Return the errors of the run and of the one beside it; empty without a second or a reference.
-
-    Relative to the truth, or else to the fixes of the first receiver, as in the paper: then the
-    errors contain those of the fixes, and the lever arm of the antenna.
-    """
-    if result.beside is None or not reference_words(result):
-        return ()
-    kinds = (result.spec.damping.kind, str(result.spec.damping.beside))
-    return tuple(
-        _horizontal(result, kind, record)
-        for kind, record in zip(kinds, (result.filtered, result.beside), strict=True)
-    )
-
-
-def _receiver(result: NavigationRun) -> str:
-    """Name of the first measurement with positions."""
-    tables = result.source.tables
-    return next((name for name, one in tables.items() if set(GEODETIC) <= set(one.columns)), "")
-
-
-def _horizontal(result: NavigationRun, kind: str, record: NavigationRecord) -> HorizontalErrors:
-    trajectory = record.trajectory
-    if result.source.truth is not None:
-        apart = trajectory_differences(trajectory, result.source.truth, result.ellipsoid)
-        time = index_of(apart)
-        position = np.hypot(*values_of(apart, ["north", "east"]).T)
-        velocity = np.hypot(*values_of(apart, ["VN", "VE"]).T)
-    else:
-        fixes = result.source.tables[_receiver(result)]
-        time = index_of(fixes)
-        stamps = index_of(trajectory)
-        inside = (time >= stamps[0]) & (time <= stamps[-1])
-        inside &= np.isfinite(values_of(fixes, GEODETIC)).all(axis=1)
-        time, fixes = time[inside], fixes[inside]
-        own = {c: np.interp(time, stamps, trajectory[c]) for c in (*GEODETIC, *VELOCITY[:2])}
-        places = values_of(fixes, GEODETIC)
-        off = [
-            ned_from_geodetic([[own[c][k] for c in GEODETIC]], place)[0]
-            for k, place in enumerate(places)
-        ]
-        position = np.hypot(*np.reshape(off, (-1, 3))[:, :2].T)
-        velocity = np.hypot(*(own[c] - fixes[c].to_numpy() for c in VELOCITY[:2]))
-    marks = index_of(record.sd)
-    stated = [
-        np.interp(time, marks, np.hypot(*values_of(record.sd, columns).T))
-        for columns in (["VN", "VE"], ["north", "east"])
-    ]
-    return HorizontalErrors(kind, time, velocity, position, *stated)
-
-
 @dataclass(frozen=True)
 class ShownStates:
     """States of one kind, with their display unit.
@@ -442,24 +370,6 @@ def state_groups(record: NavigationRecord) -> dict[str, list[str]]:
     for column in map(str, record.sensors.columns):
         groups.setdefault(column.rpartition("_")[0] or column, []).append(column)
     return groups
-
-
-def blocks_of(record: NavigationRecord) -> tuple[ShownStates, ...]:
-    """Return the blocks of sensor and measurement error states, in their order."""
-    out = []
-    for name, columns in state_groups(record).items():
-        labels = [c.removeprefix(name).lstrip("_") for c in columns]
-        # The unit must suit both the estimates and their standard deviations.
-        sizes = [view_of(table, columns) for table in (record.sensors, record.sensors_sd)]
-        size = max((float(np.nanmax(np.abs(v))) for v in sizes if v.size), default=0.0)
-        let_go_of_all()
-        factor, unit = shown_unit(record.units.get(columns[0], ""), size)
-        aid, dot, own = name.rpartition(".")
-        words = own.replace("_", " ")
-        words = f"{aid}: {words}" if dot else words.replace("accel ", "accelerometer ")
-        slug = name.replace("_", "-").replace(".", "-")
-        out.append(ShownStates(words, slug, tuple(columns), tuple(labels), unit, factor))
-    return tuple(out)
 
 
 def rejected_times(table: pd.DataFrame) -> Array:
@@ -552,6 +462,8 @@ def _against_known(evaluation: NavigationEvaluation) -> list[Finding]:
         out.append(reason(good, code, component=component, **data))
     tests = [one.result for one in evaluation.run.withheld]
     if tests:
+        from strapdown.navigation.outage_test import judge_outages
+
         verdict = judge_outages(tests)
         worst = tests[verdict.worst]
         code = "navigation.outage-tests"

@@ -74,8 +74,11 @@ def _drawn(evaluation: NavigationEvaluation) -> tuple[Chart, Plane] | None:
     """The chart without a map, and its plane; None without motion."""
     record = evaluation.record
     table = record.trajectory
-    rows = _rows(evaluation)
-    kept = table.iloc[rows]
+    # Rows that preserve the course, and those at the ends of modes and outages.
+    spans = [*record.modes, *(s for v in record.outages.values() for s in v)]
+    edges = np.searchsorted(table.index.to_numpy(), [t for s in spans for t in (s.begin, s.end)])
+    edges = np.clip(edges, 0, len(table) - 1)
+    kept = table.iloc[np.unique(np.concatenate([_course(table, evaluation), edges]))]
     origin = places_of(table.iloc[:1])[0]
     ned = ned_from_geodetic(places_of(kept), origin, ellipsoid=evaluation.run.ellipsoid)
     reach = float(np.ptp(ned[:, :2], axis=0).max())
@@ -118,15 +121,6 @@ def plan_tiles(evaluation: NavigationEvaluation, opened: MapFile) -> list[Tile]:
     return [tile for tile, _ in chosen_tiles(opened, map_box(plane, *plane_view(chart))).tiles]
 
 
-def _rows(evaluation: NavigationEvaluation) -> NDArray[np.intp]:
-    """Rows that preserve the course, and those at the ends of modes and outages."""
-    table = evaluation.record.trajectory
-    rows = _course(table, evaluation)
-    spans = [*evaluation.record.modes, *(s for v in evaluation.record.outages.values() for s in v)]
-    edges = np.searchsorted(table.index.to_numpy(), [t for s in spans for t in (s.begin, s.end)])
-    return np.unique(np.concatenate([rows, np.clip(edges, 0, len(table) - 1)]))
-
-
 def _course(table: pd.DataFrame, evaluation: NavigationEvaluation) -> NDArray[np.intp]:
     """Rows that preserve the course, including the last one."""
     # At this sampling no vehicle leaves its course between samples.
@@ -167,21 +161,18 @@ def _path(record: NavigationRecord, time: Array, path: tuple[Array, Array]) -> l
             colour = (VERMILLION, PURPLE)[lost.index(name) % 2]
         else:
             colour = mode_colour(name, names) if name in names else BLUE
-        x, y, stamps = _pieces(what == name, *path, time)
+        # Stretches of its steps, with NaN between them.
+        runs, gap = true_runs(what == name), np.array([np.nan])
+        x, y, stamps = (
+            np.concatenate([part for r in runs for part in (column[r.start : r.stop + 1], gap)])[
+                :-1
+            ]
+            for column in (*path, time)
+        )
         width = 3.2 if name in lost else 2.0
         out.append(Line(str(name), x, y, colour, width=width, stamps=stamps))
     # Outages are drawn on top.
     return sorted(out, key=lambda line: line.name in lost)
-
-
-def _pieces(of: NDArray[np.bool_], *columns: Array) -> tuple[Array, ...]:
-    """Stretches of the columns of a path over some of its steps, with NaN between them."""
-    gap = np.array([np.nan])
-    runs = true_runs(of)
-    return tuple(
-        np.concatenate([part for r in runs for part in (column[r.start : r.stop + 1], gap)])[:-1]
-        for column in columns
-    )
 
 
 def _fixes(plane: Plane, view: PlanView) -> tuple[list[Line], str]:

@@ -93,7 +93,11 @@ def path_marks(time: Array, paths: list[Path], view: PlanView, colour: str) -> l
     ends = [(float(east[k]), float(north[k])) for k in (0, -1)]
     seen: list[tuple[float, float]] = []
     labels, lengths = [], [0.0]
-    for at in _round_times(float(time[0]), float(time[-1])):
+    # Multiples of a round step, at most `_TIMES`.
+    start, finish = float(time[0]), float(time[-1])
+    least = (finish - start) / _TIMES
+    step = next((s for s in _STEPS if s >= least), _HALF_DAY * np.ceil(least / _HALF_DAY))
+    for at in step * np.arange(np.ceil(start / step), np.floor(finish / step) + 1.0):
         place = (float(np.interp(at, time, east)), float(np.interp(at, time, north)))
         # Skip positions near the start, the end or another mark, as of a stationary vehicle.
         if all(np.hypot(place[0] - x, place[1] - y) > _APART * view.width for x, y in ends + seen):
@@ -101,11 +105,16 @@ def path_marks(time: Array, paths: list[Path], view: PlanView, colour: str) -> l
             labels.append(f"{at + 0.0:.12g} s")  # without the sign of -0
             lengths.append(float(np.interp(at, time, way)))
     points = np.array(ends + seen)
+    # Evenly spaced positions along each path, which labels should avoid.
+    along = []
+    for path in paths:
+        whole = _way(*path)
+        along.append(_at(whole, np.linspace(0.0, whole[-1], 150), *path).T)
     places = place_labels(
         points[:, 0],
         points[:, 1],
         ["start", "end", *labels],
-        np.vstack([view.corners, *map(_along, paths)]),
+        np.vstack([view.corners, *along]),
     )
     # The end mark is smaller, so that both show where a path returns to its start.
     marks = [
@@ -150,13 +159,6 @@ def _arrows(east: Array, north: Array, tips: Array, size: float, colour: str) ->
     return Line("direction", heads[0].ravel(), heads[1].ravel(), colour, width=1.8, legend=False)
 
 
-def _round_times(first: float, last: float) -> Array:
-    """Multiples of a round step between two instants, at most `_TIMES`."""
-    least = (last - first) / _TIMES
-    step = next((s for s in _STEPS if s >= least), _HALF_DAY * np.ceil(least / _HALF_DAY))
-    return step * np.arange(np.ceil(first / step), np.floor(last / step) + 1.0)
-
-
 def _way(east: Array, north: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(east), np.diff(north)))])
 
@@ -164,12 +166,6 @@ def _way(east: Array, north: Array) -> Array:
 def _at(way: Array, where: Array, east: Array, north: Array) -> Array:
     """East and north at given path lengths, (2, m)."""
     return np.vstack([np.interp(where, way, east), np.interp(where, way, north)])
-
-
-def _along(path: Path) -> Array:
-    """Evenly spaced positions along a path that labels should avoid, (m, 2)."""
-    way = _way(*path)
-    return _at(way, np.linspace(0.0, way[-1], 150), *path).T
 
 
 # Positions of point labels that avoid overlap.

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from strapdown.crash.case import CaseResult
     from strapdown.crash.delta_v_bound import VelocityChange
     from strapdown.crash.pdof import AngleInterval
-    from strapdown.crash.reconstruction import UnitReconstruction
 
 
 #: km/h per m/s.
@@ -321,9 +320,10 @@ def moment(time: float) -> str:
     return f"{plain(1e3 * abs(time), 1)}{GAP}ms {'before' if time < 0.0 else 'after'} the trigger"
 
 
-def recorder(unit: UnitReconstruction, result: CaseResult) -> str:
-    """Return the name of an answer's recorder, or of the mean."""
-    return MEAN if unit is result.reconstruction.combined else unit.name
+def recorder(name: str, result: CaseResult) -> str:
+    """Return the name of an answer as it is shown: of its recorder, or of the mean."""
+    combined = result.reconstruction.combined
+    return MEAN if combined is not None and name == combined.name else name
 
 
 def side_words(forward: float, right: float) -> str:

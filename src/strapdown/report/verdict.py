@@ -114,7 +114,8 @@ def heading_words(trust: IntegrityReport) -> str:
     last = heading.spans[-1]
     check = "" if last.status != "trusted" else check_words(trust)
     shares = {status: heading.share(status) for status in STATUSES}
-    return heading_sentence(shares, last.status, last.reason, check, unconfirmed_words(trust))
+    why_not = "; ".join(one.sentence() for one in trust.unconfirmed)
+    return heading_sentence(shares, last.status, last.reason, check, why_not)
 
 
 def heading_sentence(
@@ -156,11 +157,6 @@ def worst_words(trust: IntegrityReport) -> str:
         f"{capital(worst.name)}: rejected {share_words(worst.share('rejected'))} of the time "
         f"({QUANTITY_REASONS['apart']}); final status: {status}{why}{more}."
     )
-
-
-def unconfirmed_words(trust: IntegrityReport) -> str:
-    """Return the reasons why no independent check could confirm the heading."""
-    return "; ".join(one.sentence() for one in trust.unconfirmed)
 
 
 def promise(trust: IntegrityReport) -> tuple[tuple[str, str], ...]:
@@ -370,8 +366,8 @@ def _heading(result: NavigationRun) -> tuple[Block, ...]:
         "each second, not of the smoothed run."
     )
     alone = (
-        f"No independent heading check: {unconfirmed_words(trust)}. The heading depends on its "
-        "start or on one measurement, and is never trusted."
+        f"No independent heading check: {'; '.join(one.sentence() for one in trust.unconfirmed)}. "
+        "The heading depends on its start or on one measurement, and is never trusted."
     )
     return blocks(
         heading_chart(result),

@@ -20,6 +20,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from strapdown.campaign.case_process import end_with, limit_memory
 from strapdown.errors import Finding, StrapdownError
 from strapdown.parsers.limits import memory_most, seconds_most, size_of
 
@@ -84,10 +85,10 @@ def main() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     asked = os.fdopen(os.dup(0), "rb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-    _end_with(os.getppid())
+    end_with(os.getppid())
     for line in asked:
         question = json.loads(line)
-        _limit_memory(question["memory"])
+        limit_memory(question["memory"])
         answer = _answered(question)
         answers.write(json.dumps(answer, allow_nan=False).encode() + b"\n")
         answers.flush()
@@ -112,26 +113,6 @@ def _answered(question: Mapping[str, Any]) -> dict[str, Any]:
 
 def _failed(code: str, **data: Any) -> dict[str, Any]:
     return {"error": told(Finding(code, severity="error", data=data)), "kind": "DataError"}
-
-
-def _end_with(parent: int) -> None:
-    """End this process when its keeper ends, however that happens."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
-def _limit_memory(most: int) -> None:
-    """Refuse allocations beyond the limit, so that a question meets a MemoryError."""
-    with contextlib.suppress(ImportError, ValueError, OSError):
-        import resource
-
-        hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
-        resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
 
 
 # --- its keeper ---------------------------------------------------------------------------

@@ -34,7 +34,7 @@ from strapdown.report.crash_pictures import (
     pdof_dial,
     points_picture,
 )
-from strapdown.report.crash_plan import PlanView, path_plan
+from strapdown.report.crash_plan import PlanFrame, path_plan
 from strapdown.report.plan import ellipse, envelope, hull
 from strapdown.report.svg_drawing import (
     SMALL,
@@ -305,7 +305,7 @@ def test_the_envelope_leaves_no_gap_between_ellipses():
 @pytest.mark.parametrize("names", [("north", "east"), ("forward", "right")])
 def test_a_plan_has_one_scale_and_is_seen_from_above(names):
     points = np.array([[0.0, 0.0], [30.0, 4.0]])
-    view = PlanView.of(points, names, (10.0, 20.0), 500.0, (100.0, 300.0))
+    view = PlanFrame.of(points, names, (10.0, 20.0), 500.0, (100.0, 300.0))
     origin, first, second = view.pixels([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     assert np.hypot(*(first - origin)) == pytest.approx(np.hypot(*(second - origin)))
     a, b = first - origin, second - origin

@@ -15,14 +15,10 @@ from strapdown.config.outage import OutageSpec
 from strapdown.errors import ConfigError
 from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.report.navigation import NAVIGATION
-from strapdown.report.navigation_evaluation import (
-    NavigationEvaluation,
-    paired_errors,
-    reference_words,
-)
+from strapdown.report.navigation_evaluation import NavigationEvaluation
 from strapdown.report.outage import outage_json
 from strapdown.report.outage_document import key_figures
-from strapdown.report.paired_corrections import paired_table
+from strapdown.report.paired_corrections import paired_errors, paired_table, reference_words
 from strapdown.report.values import NOT_ESTIMATED
 from strapdown.systems.navigation_run import run_navigation
 from strapdown.systems.outage_run import run_outage
