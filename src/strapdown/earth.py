@@ -244,7 +244,7 @@ def transport_rate(
 
 @dataclass(frozen=True)
 class MagneticField:
-    """The Earth's magnetic field at a place and date.
+    """The Earth's magnetic field at a position and date.
 
     Attributes
     ----------
@@ -273,7 +273,7 @@ class MagneticField:
 def magnetic_field(
     lat_deg: float, lon_deg: float, alt: float = 0.0, year: float | None = None
 ) -> MagneticField:
-    """Magnetic field by the World Magnetic Model, at one place.
+    """Magnetic field by the World Magnetic Model, at one position.
 
     Parameters
     ----------
@@ -291,7 +291,7 @@ def magnetic_field(
     Raises
     ------
     DataError
-        The place or the year is outside the model.
+        The position or the year is outside the model.
 
     Notes
     -----

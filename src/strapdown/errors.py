@@ -13,7 +13,7 @@ Templates are those of `str.format`, and besides:
 
 * a sequence is joined by ", "; ``{names:or}``, ``{names:and}``, ``{names:;}`` join by that word or
   sign, ``{names:list}`` shows it as Python does;
-* ``{name:shell}`` quotes a name or a sequence of them for a shell; ``{columns:mapping}`` shows
+* ``{name:shell}`` quotes a name or a sequence for a shell; ``{columns:mapping}`` shows
   ``a=b,c=d`` as a dictionary of Python;
 * a finding among the data gives its sentence, and ``{reason.remedy}`` its remedy;
 * ``{faults:lines}`` lists findings of one file, each on a line of its own with its location, its
@@ -306,7 +306,7 @@ def nearest(word: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
 
     `word`: what was not understood. `known`: the words that would have been. `also`: further such
     words, too many to be listed. Returns ``"did you mean 'x'? Known: a, b, c"``, or the list alone
-    when nothing is near.
+    when none is near.
     """
     words = list(known)
     close = difflib.get_close_matches(str(word), [*words, *also], n=1, cutoff=0.5)
@@ -407,7 +407,7 @@ def printable(text: str, *, lines: bool = False, json: bool = False) -> str:
     -------
     str
         With ``\x1b``, ``\n`` or ``\u202e`` for such characters, and ``\xff`` for a byte of a file
-        name that is no text.
+        name that is not text.
     """
     if text.isascii() and text.isprintable():
         return text
@@ -427,7 +427,7 @@ def printable(text: str, *, lines: bool = False, json: bool = False) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """The value as data: no arrays, no views, nothing that changes later."""
+    """The value as data: no arrays, no views, no value that changes later."""
     if value is None or isinstance(value, Finding):
         return value
     if isinstance(value, bool | int | float | str):

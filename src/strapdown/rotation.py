@@ -244,7 +244,7 @@ def dcm_from_rotation_vector(rotation_vector: ArrayLike) -> Array:
 
     Notes
     -----
-    Alexiev (2021), Eq. (12), by functions of the half angle, so that nothing cancels and
+    Alexiev (2021), Eq. (12), by functions of the half angle, so that no digits are lost and
     zero needs no special case.
     """
     rows, leading = _rows_of(rotation_vector, (3,), "rotation vector")

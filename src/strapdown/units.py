@@ -105,7 +105,7 @@ INFERRED = {
     "accel": ("m/s2", "g", "mg", "ft/s2", "-m/s2", "-g"),
     "mag": ("uT", "nT", "gauss", "mG", "T"),
 }
-#: Words of raw counts, which a file states in place of a unit.
+#: Words of raw counts, which a file states instead of a unit.
 COUNTS = {
     *("lsb", "lsbs", "count", "counts", "cts", "digit", "digits", "dn", "adc", "raw", "int16"),
     *("i16", "ticks"),
@@ -427,7 +427,7 @@ ENDINGS = {
 def named_unit(name: str) -> tuple[str, str]:
     """Split a name into words and the unit of its ending: ``end_error_m``, end error and m.
 
-    The unit is empty where the ending is none of `ENDINGS`, or the name is nothing but a unit.
+    The unit is empty where the ending is none of `ENDINGS`, or the name is a unit alone.
     """
     ending = max((e for e in ENDINGS if name.endswith(e)), key=len, default="")
     words = name.removesuffix(ending)

@@ -484,7 +484,7 @@ class OrientationFilter:
             Specific force. A filter uses every sample, and takes None or NaN as a missing one; an
             algorithm requires it during the leveling, and does not use it afterwards.
         mag : array_like, (3,), optional
-            Magnetic field in any unit, for a filter; None or NaN if there is no new sample.
+            Magnetic field in any unit, for a filter; None or NaN without a new sample.
 
         Returns
         -------

@@ -18,7 +18,7 @@ def compare_runs(*runs: str | Path | Saved, progress: Progress = silent) -> RunC
     *runs : str, Path or run
         Two or more: folders that runs wrote, of any command; configurations of `navigate`, `align`
         or `reconstruct` (``.toml``), which are run first; or runs in memory, as of `navigate`,
-        named by their place (``run 1``). Differences are against the first.
+        named by their index (``run 1``). Differences are against the first.
     progress : callable, optional
         Called with a stage and the completed fraction.
 
@@ -33,7 +33,7 @@ def compare_runs(*runs: str | Path | Saved, progress: Progress = silent) -> RunC
         Fewer than two runs are given, one is given twice, a configuration is faulty, or runs of
         different commands have no option and no input in common.
     DataError
-        A folder is no result, its files are damaged, or it has symbolic links. A result that was
+        A folder is not a result, its files are damaged, or it has symbolic links. A result that was
         changed after it was sealed is compared, and `RunComparison.findings` say so.
 
     Examples

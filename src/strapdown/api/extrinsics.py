@@ -197,7 +197,7 @@ def _kind_of(other: Any) -> str:
             refused.append(error)
             continue
         return kind
-    # Of a file of fixes: what is wrong with them, and not that it is no log.
+    # Of a file of fixes: what is wrong with them, and not that it is not a log.
     code, data = refused[0].finding.code, refused[0].finding.data
     fixes = code == "io.no-stream" and "gnss" in data["streams"]
     raise refused[1 if fixes else 0]

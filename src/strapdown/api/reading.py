@@ -91,7 +91,7 @@ class GnssFile:
 
 
 class FoundTable(pd.DataFrame):
-    """A DataFrame with findings, whose warnings stand below it wherever it is shown."""
+    """A DataFrame with findings, whose warnings are below it wherever it is shown."""
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -379,7 +379,7 @@ def read_gnss(
 
 
 def _require_path(path: Any) -> None:
-    """Refuse what is no path, as a table, which needs no reading."""
+    """Refuse what is not a path, as a table, which needs no reading."""
     if not isinstance(path, str | os.PathLike):
         raise ConfigError("api.table-for-path", quantity="path", kind=type(path).__name__)
 

@@ -228,7 +228,7 @@ def _pieces(
         yield algorithm.quaternions(np.vstack([first, history])), state
 
 
-#: Samples of one step of `history_of_samples`: what is formed of them stays in the cache.
+#: Samples of one step of `history_of_samples`: what they form stays in the cache.
 CHUNK = 8192
 
 
@@ -332,7 +332,7 @@ _ndarray = np.ndarray
 
 
 def refuse_sample(taken: int, last: float, time: float, gyro: ArrayLike) -> NoReturn:
-    """Raise DataError for a sample after `taken` others, the last of them at `last`, s."""
+    """Raise DataError for a sample after `taken` others, the last at `last`, s."""
     if taken > 0 and time <= last and np.size(gyro) == 3:
         raise DataError(
             "attitude.time-does-not-advance-followed",

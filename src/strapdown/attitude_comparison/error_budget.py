@@ -42,7 +42,7 @@ STARTS, INSTANTS = 1.0, 0.1
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """What the rotations of a log against a truth say of its gyro, and what removing it leaves.
+    """Gyro errors from the rotations of a log against a truth, and the error without them.
 
     Estimated from the record itself: a bound of what a calibration could remove, not a calibration.
 

@@ -97,8 +97,8 @@ class AttitudeOptions:
         the truth where there is one, leveled where the log begins at rest, and zero otherwise.
     gyro_bias : str or array_like, (3,), rad/s
         ``auto``, as ``rest`` where there is a rest and its mean is significant; ``none``;
-        ``rest``, the mean over the first stationary stretch; ``rests``, interpolated
-        between all of them; three numbers and a unit about forward, right, down; or the path of a
+        ``rest``, the mean over the first stationary stretch; ``rests``, interpolated between all
+        stretches; three numbers and a unit about forward, right, down; or the path of a
         log of the stationary sensor.
     magnetometer : str or Path
         For the filters: ``auto``, hard and soft iron are removed where the log shows them

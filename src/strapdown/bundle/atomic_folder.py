@@ -6,7 +6,7 @@
    folder around both is flushed.
 
 Where the system can exchange two names in one step (``renameat2`` of Linux, ``renamex_np`` of
-macOS), one of the old and the new content stands at the destination at each instant. Elsewhere an
+macOS), one of the old and the new content is at the destination at each instant. Elsewhere an
 old folder is renamed first: a process killed between the two renames leaves nothing at the name,
 and the next run into it restores the old one.
 
@@ -34,7 +34,7 @@ from typing import Any
 from strapdown.errors import ConfigError
 
 MANIFEST = "manifest.json"
-#: What a system promises differs; tests stand in for the others.
+#: Guarantees differ between systems; tests simulate the others.
 WINDOWS, MACOS = os.name == "nt", sys.platform == "darwin"
 _LOCK = re.compile(r"\.(?P<name>.+)\.lock", re.S)
 _LEFT = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{16}\.(?P<kind>partial|old)", re.S)

@@ -1,6 +1,6 @@
 """Signatures of bundles: Ed25519 over ``manifest.json``, each in a file of its own beside it.
 
-The manifest holds the SHA-256 of every file, so that its signature covers all of them. Any program
+The manifest holds the SHA-256 of every file, so that its signature covers all files. Any program
 with Ed25519 can check it: the signed message is the bytes of ``manifest.json``. Keys are PEM files
 (PKCS 8), or those of OpenSSH (``ssh-ed25519``).
 """

@@ -28,7 +28,7 @@ __all__ = ["CaseProcess", "Row", "run_case"]
 #: Outcome of a case: status, code, findings, scalars in order, curves in order.
 Row = dict[str, Any]
 _LENGTH = struct.Struct("<Q")
-#: Grace beyond the limit before a process that answers nothing is ended, s.
+#: Grace beyond the limit before a process that does not answer is ended, s.
 GRACE = 1.0
 #: Least time of a process to start and to load what it runs, s.
 START = 120.0
@@ -127,7 +127,7 @@ def _send(stream: IO[bytes], message: Any) -> None:
 
 
 def _receive(stream: IO[bytes]) -> Any:
-    """Read one message, and nothing of the next; EOFError where the stream ends before its end."""
+    """Read one message, not a byte of the next; EOFError where the stream ends before its end."""
     return pickle.loads(_exactly(stream, _LENGTH.unpack(_exactly(stream, _LENGTH.size))[0]))
 
 
@@ -163,10 +163,10 @@ def limit_memory(most: int) -> None:
 
 def main() -> None:
     """Serve cases on the standard streams until the input ends."""
-    # What a case prints must not be among the answers.
+    # The output that a case prints must not be among the answers.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    # Unbuffered: nothing of the next message is read with one.
+    # Unbuffered: not a byte of the next message is read with one.
     asked = os.fdopen(os.dup(0), "rb", buffering=0)
     end_with(os.getppid())
     from strapdown.campaign.design import Campaign

@@ -96,8 +96,8 @@ class Campaign:
     def of(cls, spec: CampaignSpec, folder: Path) -> Campaign:
         """Resolve a specification, and check that its cases can be run.
 
-        `folder`: of its file. ConfigError: a file is missing, a log matches nothing, a parameter is
-        no key of the configuration, or a name of a statistic is unknown.
+        `folder`: of its file. ConfigError: a file is missing, a log has no match, a parameter is
+        not a key of the configuration, or a name of a statistic is unknown.
         """
         base = spec.base
         file = None if base.file is None else folder / base.file
@@ -167,7 +167,7 @@ class Campaign:
         return tuple(found)
 
     def plain(self) -> dict[str, Any]:
-        """Return what the campaign is, as plain data without the places of its files."""
+        """Return what the campaign is, as plain data without the paths of its files."""
         spec = self.spec.plain()
         return {
             "schema": "strapdown campaign 1",
@@ -198,7 +198,7 @@ class Campaign:
 
     @cached_property
     def identity(self) -> str:
-        """Digest of all that the numbers of a case depend on, without the place of the files."""
+        """Digest of all that the numbers of a case depend on, without the paths of the files."""
         plain = self.spec.plain()
         for key in ("stop", "limits", "title"):
             plain.pop(key, None)
@@ -236,7 +236,7 @@ class Campaign:
 
     @cached_property
     def scalars(self) -> dict[str, str]:
-        """Kept scalars by name, and their places in the data of a result."""
+        """Kept scalars by name, and their paths in the data of a result."""
         return dict(self.spec.keep.scalars or KINDS[self.spec.base.kind].scalars)
 
     @cached_property

@@ -40,7 +40,7 @@ UNOBSERVED = {
     "distributed.admin.tick.interval": "500ms",
 }
 
-#: Processes of this worker by campaign: those that wait for a batch, and all of them.
+#: Processes of this worker by campaign: those that wait for a batch, and all.
 _IDLE: dict[str, queue.SimpleQueue[CaseProcess]] = {}
 _ALL: dict[str, list[CaseProcess]] = {}
 

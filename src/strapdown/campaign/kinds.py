@@ -1,4 +1,4 @@
-"""What a case runs: by kind, a configuration to a result, its numbers, and its sealed folder."""
+"""Kinds of cases: from a configuration to a result, its numbers, and its sealed folder."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ class Kind:
     save : callable
         From a result and a folder to its sealed folder.
     scalars : mapping of str to str
-        What is kept if a campaign does not say: names, and places in the data.
+        What is kept if a campaign does not say: names, and paths in the data.
     seed : tuple of str
-        Place of the seed in the configuration; empty without one.
+        Path of the seed in the configuration; empty without one.
     log : tuple
-        Place of the path of a log.
+        Key of the path of a log.
     curves : callable, optional
         From a view to a table over the time from its start, s.
     """
@@ -62,13 +62,13 @@ class Kind:
     view: Callable[[Any], Any] = field(default=lambda run: run)
 
 
-# --- places in plain data -----------------------------------------------------------------
+# --- paths in plain data ------------------------------------------------------------------
 
 
 def at_path(node: Any, path: Iterable[str | int]) -> Any:
-    """Return the value at a place, or None: numbers are places in a list, from 0.
+    """Return the value at a path, or None: numbers are indices of a list, from 0.
 
-    A function on the way is computed: what nobody asks for costs nothing.
+    A function on the way is computed: what nobody asks for costs no time.
     """
     for part in path:
         if isinstance(node, dict):
@@ -82,9 +82,9 @@ def at_path(node: Any, path: Iterable[str | int]) -> Any:
 
 
 def with_value(table: Table, path: KeyPath, value: Any) -> Table:
-    """Return a table with a value at a place; tables on the way are made.
+    """Return a table with a value at a path; tables on the way are made.
 
-    KeyError: a part of the path is no table, or is beyond the end of a list.
+    KeyError: a part of the path is not a table, or is beyond the end of a list.
     """
     out = copy.copy(table)
     node: Any = out
@@ -252,7 +252,7 @@ def _attitude_data(run: Any) -> Table:
     from strapdown.report.attitude import attitude_json
 
     data = attitude_json(run)
-    # By name, since the order of the algorithms is no key.
+    # By name, since the order of the algorithms is not a key.
     data["by_algorithm"] = {one["algorithm"]: one for one in data["algorithms"]}
     first = data["algorithms"][0]["scores"]
     data["first"] = first[0] if first else {}

@@ -165,7 +165,7 @@ def _answers(results: Results, cell: Cell) -> Iterator[KeyFigure]:
 
 
 def _medians(results: Results, cell: Cell) -> Iterator[KeyFigure]:
-    """Medians of the first scalars, where nothing else is asked of the only cell."""
+    """Medians of the first scalars, where no others are asked of the only cell."""
     for name in results.scalars[:4]:
         (words, unit), one = words_and_unit(name), cell["scalars"][name]
         low, middle, high = (quantile(one, p) for p in (0.05, 0.5, 0.95))

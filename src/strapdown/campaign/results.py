@@ -114,7 +114,7 @@ class Results:
         return ", ".join(names) or "all"
 
     def listed_cells(self, cells: Sequence[Cell]) -> str:
-        """Names of the first cells, or the one value that all of them and no others have."""
+        """Names of the first cells, or the one value that all these and no others have."""
         for key, values in self.grid.items():
             for value in values:
                 own = [cell for cell in self.cells if cell["parameters"][key] == value]

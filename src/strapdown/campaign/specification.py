@@ -31,9 +31,9 @@ DRAWS = {
 
 @cache
 def key_path(text: str) -> KeyPath:
-    """Split a dotted key as TOML does; a part that is a whole number is the place in a list.
+    """Split a dotted key as TOML does; a part that is a whole number is the index in a list.
 
-    ``observations."gnss.position".mean_nis`` has three parts. ValueError: it is no key.
+    ``observations."gnss.position".mean_nis`` has three parts. ValueError: it is not a key.
     """
     node: Any = tomllib.loads(f"{text} = 0")
     path: list[str | int] = []

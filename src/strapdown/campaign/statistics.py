@@ -2,7 +2,7 @@
 
 A *stream* is a function that returns an iterator over blocks of values, the same at each call, so
 that several passes are possible. Values belong to *groups*, numbered from 0, such as one scalar in
-one cell; NaN is no value and is counted.
+one cell; NaN is not a value and is counted.
 
 Means and variances are merged block by block (Chan, Golub and LeVeque 1983). Order statistics are
 exact: each pass counts the values by the leading digits of their binary form, within the one
@@ -322,7 +322,7 @@ def quantile_ranks(count: Whole, levels: Sequence[float], confidence: float = 0.
     -------
     ndarray of int, (groups, levels, 4)
         From 0: the two about the quantile, then the ends of the interval. -1 for an end that does
-        not exist, as few values say nothing of the far ends of a distribution.
+        not exist, as few values do not show the far ends of a distribution.
     """
     p = np.asarray(levels, dtype=np.float64)
     sizes, of = np.unique(count, return_inverse=True)
@@ -435,7 +435,7 @@ def count_between(edges: Array, values: Array) -> Whole:
 
 
 class Extremes:
-    """Values beyond two fences of each group, counted, and the farthest of them.
+    """Values beyond two fences of each group, counted, and the farthest ones.
 
     Attributes
     ----------
@@ -485,7 +485,7 @@ class SobolIndices:
     Attributes
     ----------
     samples, left_out : int
-        Base samples, and those that are not used because a case of them has no value.
+        Base samples, and those that are not used because one of their cases has no value.
     first, total : ndarray, (parameters, 3)
         Index of the first order and total index: value, low and high end.
     """

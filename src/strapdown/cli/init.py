@@ -198,8 +198,8 @@ def _propose(
     """Write the drafts of a configuration, and print what was found and what the user must say.
 
     `draft`: called with the folder of the files, and progress; returns one draft, or one for each
-    vehicle. `question`: above what the user is to confirm, with braces for the file; nothing is
-    listed if empty.
+    vehicle. `question`: above what the user is to confirm, with braces for the file; no list if
+    empty.
     """
     from strapdown.cli.console import console, print_findings, progress
     from strapdown.cli.result_folder import refuse_result

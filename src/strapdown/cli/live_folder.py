@@ -122,7 +122,7 @@ def output_of(journal: Journal, out: Path | None, force: bool) -> Path:
 def open_lines(
     where: str | None, clock: RunClock, token: str | None, warn: Callable[[Finding], None]
 ) -> LineSource | None:
-    """Open the source of a run, if it has one, and tell a token that was drawn for commands."""
+    """Open the source of a run, if it has one, and print a token that was drawn for commands."""
     if where is None:
         return None
     source = open_source(where, clock, sys.stdin.buffer, token)

@@ -241,7 +241,7 @@ def introduced(flags: list[str], given: list[str]) -> str:
 
 
 def _fill_in(flags: list[str], given: list[str]) -> str:
-    """Return what the placeholders stand for, by the help of their options."""
+    """Return the meaning of the placeholders, by the help of their options."""
     params = [p for name in (given[0], "attitude", "navigate") for p in _parameters(name, given)]
     said = []
     for option, word in _blanks(flags).items():

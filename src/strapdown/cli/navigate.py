@@ -248,7 +248,7 @@ def _session_that_navigated(path: Path, *, pace: bool = False) -> Path | None:
     """Return the folder of a session that navigated, by itself or its journal; None of others.
 
     `pace`: whether it is to be played at a pace. ConfigError: it is, and computed an attitude,
-    which is no navigation to play.
+    which is not a navigation to play.
     """
     from strapdown.formats.live_journal import run_of, session_folder
 

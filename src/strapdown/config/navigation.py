@@ -148,7 +148,7 @@ class WarmingTable(Spec):
     time_s: Positive = 400.0
 
     def make(self) -> Warming | None:
-        """Make the change of the biases, in SI; None where nothing changes."""
+        """Make the change of the biases, in SI; None without a change."""
         gyro, accel = self.gyro_sd_deg_per_h / DEG_PER_HOUR, 1e-6 * self.accel_sd_ug
         if not gyro and not accel:
             return None

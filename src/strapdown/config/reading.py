@@ -178,7 +178,7 @@ def _with_absolute_paths(file: TomlFile) -> tuple[dict[str, Any], list[Fault]]:
         # What cannot name a file is refused by the form.
         if not isinstance(node, str) or not node.isprintable() or not node.strip():
             return node
-        # Of each log of a fleet: its place is known when the log is.
+        # Of each log of a fleet: its path is known when the log is.
         if any(word in node for word in OF_LOG):
             return node
         key = next((k for k in reversed(path) if isinstance(k, str)), "")

@@ -120,7 +120,7 @@ class At:
 
 @dataclass(frozen=True)
 class Fault:
-    """Finding about a key, before its place in the file is known.
+    """Finding about a key, before its position in the file is known.
 
     Attributes
     ----------
@@ -530,7 +530,7 @@ def refusal(
 
 
 def located(fault: Fault, table: Mapping[str, Any], file: TomlFile | None) -> Finding:
-    """Return a fault with its place in the file, or in the table alone, as `refusal`."""
+    """Return a fault with its position in the file, or in the table alone, as `refusal`."""
     path, what = fault.path, fault.what
     if isinstance(what, Finding):
         # A lower layer may name a part of the value.

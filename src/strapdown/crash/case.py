@@ -71,7 +71,7 @@ if TYPE_CHECKING:
     from strapdown.crash.closure import Blame, Closure
     from strapdown.crash.drive_entry import DriveEntry
 
-# Standard deviation of a speed of the wheels, and of the place of an axle that is stated.
+# Standard deviation of a speed of the wheels, and of the position of an axle that is stated.
 SPEED_SD, AXLE_SD = 0.1, 0.05  # m/s, m
 # Most numbers of a Monte Carlo, in a file: 16 GB.
 MOST_NUMBERS = 2_000_000_000
@@ -144,7 +144,7 @@ class CaseResult:
 def run_cases(
     cases: Sequence[tuple[CaseSpec, Path | None]], progress: Progress = silent
 ) -> tuple[CaseResult, ...]:
-    """Reconstruct every vehicle of a crash by its own case, and close two of them.
+    """Reconstruct every vehicle of a crash by its own case, and close two vehicles.
 
     Parameters
     ----------
@@ -450,7 +450,7 @@ def _drive(spec: CaseSpec) -> DriveEntry:
 
 
 def _speeds(entry: EntrySpec) -> pd.DataFrame:
-    """Speeds of the wheels, m/s; `DataError`: nothing states their unit."""
+    """Speeds of the wheels, m/s; `DataError`: their unit is not stated."""
     assert entry.speed_path is not None
     names = {} if entry.speed_column is None else {"speed": entry.speed_column}
     table = read_aid_table(entry.speed_path, {"speed": "m/s"}, names=names)

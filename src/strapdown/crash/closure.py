@@ -57,7 +57,7 @@ RATIO = 32.0
 # add nothing.
 FREE_MASS, FREE_HEADING = 10.0, 10.0
 # A gross error of unknown size: relative standard deviation of a wrong mass, scale or speed, so
-# that zero and twice the value are one of them away.
+# that zero and twice the value are one of these deviations away.
 GROSS = 1.0
 # Relative to the largest variance: smaller ones are rounding.
 FLOOR = 1e-15
@@ -81,7 +81,7 @@ SIZE = 14
 
 @dataclass(frozen=True)
 class Figure:
-    """A number with its 95 % bound, `low` to `high`; infinite where nothing bounds it."""
+    """A number with its 95 % bound, `low` to `high`; infinite where it is unbounded."""
 
     value: float
     low: float
@@ -569,7 +569,7 @@ def close_vehicles(
     -------
     Closure
         Bounds from linear propagation of all stated unknowns, after a least-squares adjustment
-        under momentum; of ratios by Fieller's theorem. They hold only if nothing contradicts.
+        under momentum; of ratios by Fieller's theorem. They hold only without a contradiction.
 
     Raises
     ------
@@ -794,7 +794,7 @@ class Hypothesis:
 
     `log_likelihood`: of the recorded changes of velocity, up to a constant common to all
     hypotheses, with that of the limits of contact where the entry velocities are known.
-    `possible`: under it nothing contradicts.
+    `possible`: under it no contradiction remains.
     """
 
     finding: Finding
@@ -820,7 +820,7 @@ class Blame:
     def candidates(self) -> tuple[Hypothesis, ...]:
         """Those that close and are not significantly worse than the best; none where none closes.
 
-        Empty also where nothing is contradicted.
+        Empty also without a contradiction.
         """
         closing = [h for h in self.hypotheses if h.possible]
         if not (self.contradicted and closing):

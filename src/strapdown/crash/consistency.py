@@ -178,7 +178,7 @@ def common_edges(
         raise DataError("crash.unit-comparison-needs-two", quantity="units", count=len(units))
     first = max(float(u.time[0]) for u in units)
     last = min(float(u.time[-1]) for u in units)
-    # A unit without a gyro knows nothing of the turning after the time of its assumption.
+    # A unit without a gyro does not know the turning after the time of its assumption.
     known = [u.assumed_until for u in units]
     start, end = (max(first, -0.1), min(last, 0.75, *known)) if window is None else window
     if not first <= start < end <= last:
@@ -451,7 +451,7 @@ class LeverArmCheck:
 
 @dataclass(frozen=True, eq=False)
 class Turning:
-    """What the rates of one body, measured by several units, say of lever arms.
+    """Lever arms as determined by the rates of one body, measured by several units.
 
     `lever`, (3 m, 3), 1/s: effect of a position error on the increments, without the errors of the
     rates. `shift`, (3 m,), m/s, and `known`, (3 m, 3 m), (m/s)²: mean and covariance of the part of
@@ -856,7 +856,7 @@ def _shapes(units: Sequence[PointKinematics], edges: Array, values: Sequence[Arr
         groups.append(np.mean(rates, axis=0))
     shapes = [lengths[:, None]]
     for group in groups:
-        # Components of the group, but for small ones: an error of them is of second order.
+        # Components of the group, but for small ones: their error is of second order.
         left, sizes, _ = np.linalg.svd(group, full_matrices=False)
         shapes.append(left[:, sizes > SMALL_SHAPE * max(float(sizes[0]), TINY)])
     if any(u.gyro == NO_GYRO for u in units):
@@ -1003,7 +1003,7 @@ def compare_pair(
             if error.code == OFF_MOUNTING and turned.sd_deg.max() < math.degrees(MOST_SD):
                 # Its size beside the structure is drawn toward zero, and linear in the angle.
                 error = replace(error, size=np.radians(turned.vector_deg))
-            # One error has one size, and the likeliest of them is the one that is named.
+            # One error has one size, and the likeliest error is the one that is named.
             found = [error.finding(first.name, second.name)]
     return UnitPair(
         first.name,

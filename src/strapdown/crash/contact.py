@@ -41,7 +41,7 @@ class Edge:
         Unit vector, horizontal, along which the velocity changes.
     missing : float, m/s
         Change of velocity along `force` that may lie outside the record: zero where the record
-        reaches the edge, infinite where nothing in it limits that.
+        reaches the edge, infinite where the record does not limit that.
     """
 
     time: float

@@ -48,7 +48,7 @@ class Crush:
 def dynamic_crush(unit: str, path: CrashPath, event: CrashEvent) -> Crush | None:
     """Crush between a point of a vehicle and a rigid barrier that its front has met.
 
-    The front stands at the barrier from the first touch on, so that the way of the point is that by
+    The front is at the barrier from the first touch on, so that the way of the point is that by
     which it came nearer to the front. The first touch is the instant of the entry, or time zero of
     the event where the entry is earlier; the sd of time zero then counts with the speed.
 

@@ -503,7 +503,7 @@ def start_from_drive(
     sample of the drive; so a range that the drive does not reach, nonlinearity, and vibration
     rectification stay as stated. Where no nonlinearity is stated and the crash goes beyond three
     times the drive, the estimated scale factor is applied, but its standard deviation stays as
-    stated: nothing says that a scale factor at 4 m/s² holds at 300 m/s².
+    stated: a scale factor at 4 m/s² need not hold at 300 m/s².
 
     Parameters
     ----------

@@ -338,7 +338,7 @@ def prepare_together(
     unit that borrows its gyro, is not leveled by an option, and whose record begins after the
     lender's stationary interval is leveled by the lender: roll and pitch are propagated with the
     gyro to the start of the borrower's record, with their standard deviation. What units assume of
-    the vehicle is the largest that one of them states.
+    the vehicle is the largest that any unit states.
     """
     stated = {u.unit.name: u.unit.assumed for u in together.units}
     of_vehicle = with_common_assumptions([u.unit for u in together.units])

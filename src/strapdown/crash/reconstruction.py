@@ -660,7 +660,7 @@ class CrashReconstruction:
 
     @property
     def main(self) -> UnitReconstruction:
-        """The mean of the units, or the first one that nothing contradicts."""
+        """The mean of the units, or the first one without a contradiction."""
         if self.combined is not None:
             return self.combined
         doubted = () if self.comparison is None else self.comparison.doubted

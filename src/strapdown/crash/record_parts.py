@@ -873,7 +873,7 @@ def _timed(part: Part) -> Part:
 
 
 class StatedReading(NamedTuple):
-    """What a person states of a record: axes, as `parse_axes` takes them, and units; or empty."""
+    """Axes of a record that a person states, as `parse_axes` takes them, and units; or empty."""
 
     axes: str = ""
     accel_unit: str = ""
@@ -1270,7 +1270,7 @@ class KnownPath(NamedTuple):
 class KnownForce(NamedTuple):
     """A file of the force on a vehicle, as named in the case, and the column of the force.
 
-    `asked`: nothing states its unit.
+    `asked`: its unit is not stated.
     """
 
     path: str

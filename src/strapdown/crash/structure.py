@@ -1,4 +1,4 @@
-"""Structural motion of a measuring point against its vehicle, or a single error instead of it."""
+"""Structural motion of a measuring point against its vehicle, or a single error instead."""
 
 from __future__ import annotations
 
@@ -356,7 +356,7 @@ class PointContrasts:
         m of them.
     values : sequence of ndarray, (j, m), m/s
         Along each vehicle axis, orthonormal contrasts of the points that measure it: independent
-        of each other, with the structural variance of one point. None or more of them.
+        of each other, with the structural variance of one point. None or more.
     shapes : ndarray, (m, q)
         By which errors of the recorders and the turning of the vehicle change the increments.
     """

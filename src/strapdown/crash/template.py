@@ -277,7 +277,7 @@ TABLES = (".csv", ".tsv", ".txt", ".xlsx")
 
 
 def _beside(records: Sequence[CrashRecord], folder: Path) -> list[Skipped]:
-    """Tables in the folders of the records that are no part of them."""
+    """Tables in the folders of the records that do not belong to a record."""
     known = {file.resolve() for record in records for file in record.files}
     folders = {record.files[0].parent for record in records if len(record.files) > 1}
     why = "it is no part of the record in its folder; to use it, name it, too"

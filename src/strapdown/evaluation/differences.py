@@ -104,7 +104,7 @@ def largest_differences(runs: tuple[AttitudeRun, ...]) -> pd.DataFrame:
 #: fewest of them, and the largest angle, rad, beyond which a rotation may pass for a shorter one.
 WINDOW, LEAST_WINDOWS, LARGEST = 1.0, 5, 2.0
 #: Difference of their root mean squares that a gyro's bias allows, rad/s (MPU-6050 data sheet:
-#: within 20 deg/s, one sigma a third of it), and the share of the larger: offsets of clocks,
+#: within 20 deg/s, one sigma a third), and the share of the larger: offsets of clocks,
 #: scale factors and the noise of a reference change a root mean square by less.
 BIAS, SHARE = 0.12, 0.25
 

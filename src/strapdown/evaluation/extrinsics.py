@@ -190,7 +190,7 @@ def _whitened(rows: Residuals) -> tuple[Array, Array, Array, Rows]:
     r, z, block = apply(rows.residual), apply(rows.tests), rows.block[whole]
     if rows.local is None:
         return r, z, apply(rows.slopes), block
-    # What a block's own parameters explain is taken out (Frisch and Waugh).
+    # The part that a block's own parameters explain is taken out (Frisch and Waugh).
     local = apply(rows.local)
     for low, high in pairwise([*np.flatnonzero(np.diff(block, prepend=-1)), len(block)]):
         q, _ = np.linalg.qr(local[low:high].reshape(-1, local.shape[2]))
@@ -302,7 +302,7 @@ def named(group: str, unit: str) -> list[tuple[str, str]]:
 
 
 def crossed(vectors: Array) -> Array:
-    """What a small rotation about each axis adds to vectors, (n, 3, 3)."""
+    """Change of vectors by a small rotation about each axis, (n, 3, 3)."""
     return -rotation.cross_matrix(vectors)
 
 
@@ -405,7 +405,7 @@ class _Imus:
         return best
 
     def off(self) -> Array:
-        """Parameters less what was assumed of them."""
+        """Parameters less their assumed values."""
         out = self.x.copy()
         out[OFFSET_] = 0.0
         out[TURN_] = rotation.rotation_vector_from_dcm(self.turn @ self.began.T)
@@ -448,7 +448,7 @@ class _Imus:
         return [G, F]
 
     def modelled(self) -> tuple[Array, Array, Array]:
-        """What b shows of the rates, a's moved specific force, and what b shows of it."""
+        """Rates as b shows them, and a's moved specific force, as predicted and as b shows it."""
         x, eye = self.x, np.eye(3)
         E, E_f = (np.tensordot(x[part], SYMMETRIC, 1) for part in (SHAPE_, FORCE_SHAPE_))
         rate = self._other()[0][:, :3] @ ((eye + E) @ self.turn).T + x[BIAS_]

@@ -146,7 +146,7 @@ class _Magnetometer:
         self.turned = (summed(at) - summed(middles)[self.window]).reshape(-1, 3, 9)
 
     def off(self) -> Array:
-        """Parameters less what was assumed of them."""
+        """Parameters less their assumed values."""
         out = self.x.copy()
         out[LAG_] = 0.0
         out[FACE_] = rotation.rotation_vector_from_dcm(self.turn @ self.began.T)
@@ -283,13 +283,13 @@ def imu_to_magnetometer(
     Within a window of 3 to 10 s the field is constant in the frame that the gyros keep; its
     strength and direction in each window are free, so that a field that changes from place to
     place is allowed. Rotation and soft iron are a polar decomposition: soft iron is symmetric, and
-    what is not symmetric counts as rotation. Gyros do not show whether the readings, or one axis of
-    them, have the wrong sign: a left-handed magnetometer looks like one that is turned by 180°.
+    what is not symmetric counts as rotation. Gyros do not show whether the readings, or those of
+    one axis, have the wrong sign: a left-handed magnetometer looks like one that is turned by 180°.
     """
     check_imu(imu)
     table = magnetometer[MAG].dropna()
     time, mag = index_of(table), values_of(table, MAG)
-    # Readings that are held from row to row are late; the first of them is not.
+    # Readings that are held from row to row are late; the first one is not.
     new = np.r_[True, (np.diff(mag, axis=0) != 0.0).any(axis=1)] & mag.any(axis=1)
     time, mag = time[new], mag[new]
     if len(time) < LEAST:

@@ -1,4 +1,4 @@
-"""Kernels as C: the translator of all of them, and files for devices made from some."""
+"""Kernels as C: the translator of all, and files for devices made from some."""
 
 from __future__ import annotations
 

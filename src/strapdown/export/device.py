@@ -1,7 +1,7 @@
 """C for a device: the translation of `translate`, in what an embedded developer reads.
 
 Numbers have one precision (``real_t``), arrays are pointers to memory of the caller, constants keep
-their names, variables are declared where they begin, and comments stand where the kernel has them.
+their names, variables are declared where they begin, and comments are where the kernel has them.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def number(value: float) -> str:
 
 
 def unpacked(call: str, targets: Iterable[str], indent: str = "    ") -> str:
-    """Statements that put the results of a function into places."""
+    """Statements that assign the results of a function."""
     targets = list(targets)
     lines = wrapped(f"const real{len(targets)} result = {call};", indent)
     texts = (f"{t} = result.f{k};".replace(" ", TIE) for k, t in enumerate(targets))
@@ -170,7 +170,7 @@ class DeviceBody(Body):
     def _Assign(self, node: ast.Assign) -> None:
         at = len(self.lines)
         super()._Assign(node)
-        # Numbers that begin together are declared together; results are put into places in a row.
+        # Numbers that begin together are declared together; results are assigned in a row.
         indent, head = "    " * self.depth, f"real_t{TIE}"
         rows = [row.strip().replace(" ", TIE) for row in self.lines[at:]]
         while rows and not (rows[0].startswith(head) or RESULT.search(rows[0])):
@@ -217,7 +217,7 @@ class DeviceBody(Body):
         return Value(name, kind)
 
     def constant(self, value: Any) -> Value:
-        """Write a number that stands in the kernel."""
+        """Write a number of the kernel."""
         if isinstance(value, bool):
             return Value(str(int(value)), "b1", constant=value)
         if isinstance(value, float):

@@ -411,8 +411,8 @@ def _take(magnetometer: bool, raw: bool) -> str:
 def filter_motion(magnetometer: bool) -> Array:
     """A body that lies still for 2 s and then tumbles, with lost samples and one gap, (48, 10).
 
-    dt in s, rate, specific force and field, NaN where there is none. What it crosses is all that a
-    filter does: leveling, heading, the end of blocks, rest, a disturbed field, and a gap.
+    dt in s, rate, specific force and field, NaN where there is none. It crosses all that a filter
+    does: leveling, heading, the end of blocks, rest, a disturbed field, and a gap.
     """
     k = np.arange(SAMPLES)
     dt = np.full(SAMPLES, 0.0625)

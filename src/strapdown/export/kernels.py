@@ -56,7 +56,7 @@ class Kernels:
         self._modules = _modules(*self._homes)
         self._made: dict[tuple[object, ...], Kernel] = {}
         self._widths: dict[Kernel, dict[str, int]] = {}
-        #: What the names in specialized functions mean: functions and constants.
+        #: Meaning of the names in specialized functions: functions and constants.
         self.namespace: dict[str, Any] = {}
 
     def source(self, name: str) -> Kernel:
@@ -129,7 +129,7 @@ class Kernels:
         return self._made[key]
 
     def constant_name(self, constant: Constant) -> str:
-        """Return the name under which a constant of a module stands in the file."""
+        """Return the name that a constant of a module has in the file."""
         name = constant.name
         held = self.namespace.setdefault(name, constant)
         if (held.module, held.name) != (constant.module, constant.name):
@@ -293,7 +293,7 @@ class Specialiser:
         return any("np." in ast.unparse(n.value) and names & stored([n]) for n in assigned)
 
     def inlined(self, node: ast.Assign) -> list[ast.stmt]:
-        """Put the statements of a kernel that returns arrays in the place of its call."""
+        """Replace the call of a kernel that returns arrays by its statements."""
         target, call = node.targets[0], node.value
         assert isinstance(call, ast.Call) and isinstance(target, ast.Tuple)
         kernel: Kernel = self.held(call.func)
@@ -567,7 +567,7 @@ def refused(what: str, node: ast.AST) -> UntranslatableError:
 
 
 class Named(ast.NodeTransformer):
-    """Give variables other names, and put values in the place of parameters."""
+    """Give variables other names, and put values for parameters."""
 
     def __init__(self, names: dict[str, str], values: dict[str, ast.expr]) -> None:
         self.names, self.values = names, values

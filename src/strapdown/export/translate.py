@@ -3,7 +3,7 @@
 A kernel is translated once for each combination of types with which it is called. Types are found
 from those of the arguments, by passes over the function until the types of its variables no longer
 change. Where a name holds unlike things in turn (a number, then a tuple), it becomes two variables;
-so it does for numbers of different types, unless one place reads either of them (as in numba).
+so it does for numbers of different types, unless one expression reads either (as in numba).
 """
 
 from __future__ import annotations
@@ -231,7 +231,7 @@ class Body:
         return kind[:3] if is_array(kind) else (kind[0], len(kind)) if is_tuple(kind) else kind[:1]
 
     def _join(self, name: str, classes: frozenset[Any]) -> Any:
-        """Make one variable of those that a place may read."""
+        """Make one variable of those that an expression may read."""
         if any(c[0] != "number" for c in classes):
             raise UntranslatableError(f"{name} may be of two kinds")
         kinds = sorted({self._class(name, c[1])[1] for c in classes})
@@ -340,7 +340,7 @@ class Body:
         return left
 
     def _comment(self, statement: ast.stmt) -> None:
-        """Write what stands above a statement."""
+        """Write what is above a statement."""
 
     def _is_const(self, name: str) -> bool:
         """Whether nothing changes what an array's name points to."""
@@ -449,7 +449,7 @@ class Body:
 
     @contextmanager
     def _body_of(self, node: ast.stmt) -> Any:
-        """Translate the body of a loop: it begins with what stands before it, or at its end."""
+        """Translate the body of a loop: it begins with what is before it, or at its end."""
         before = dict(self.env)
         self.env = self._merged(before, self.at_end.get(id(node), {}))
         self.ends.append([])
@@ -645,7 +645,7 @@ class Body:
         if value.kind is None:
             raise UntranslatableError("value of a function without one")
         if node is not None:
-            # What an array or a tuple of arrays may share memory with.
+            # Arrays with which an array or a tuple of arrays may share memory.
             self._alias(name, node)
         text = self._declare(name, value.kind)
         kind = self.variables[name, self._class(name, value.kind)]

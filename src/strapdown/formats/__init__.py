@@ -99,7 +99,7 @@ Raw = RawLog | Fixes | pd.DataFrame
 STREAMS = ("imu", "gnss", "reference", "magnetometer", "barometer", "wheel")
 #: In `Reader.streams`: one table of named columns, which hold any of `STREAMS`.
 TABLE = "table"
-#: Function of a module that reads each of them.
+#: Function of a module that reads each.
 _FUNCTIONS = {"imu": "read", "gnss": "read_fixes"}
 _FUNCTIONS |= {stream: f"read_{stream}" for stream in (*STREAMS[2:], TABLE)}
 

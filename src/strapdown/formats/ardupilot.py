@@ -27,7 +27,7 @@ from strapdown.parsers.recorders import FIRST, mavlink_frames
 # File: https://ardupilot.org/dev/docs/code-overview-adding-a-new-log-message.html; messages:
 # https://ardupilot.org/copter/docs/logmessages.html. A record begins with A3 95 and the number of
 # its type; a record FMT gives each type its length, name, letters of the fields' formats, and
-# names. Letters c, C, e, E stand for hundredths and L for 1e-7 deg. Records FMTU and UNIT name
+# names. Letters c, C, e, E mean hundredths and L 1e-7 deg. Records FMTU and UNIT name
 # the units. ``TimeUS`` counts µs since the start of the autopilot. IMU: rad/s and m/s² of
 # specific force, forward, right, down. GPS: ``Alt`` is over the sea; GPA has accuracies, and
 # ``AEl``, the height over the ellipsoid, or in older logs ``Und``, the geoid undulation with its

@@ -46,7 +46,7 @@ _DAY = 86_400 * 10**9
 # A decrease of more than half a day is midnight.
 _HALF_DAY = _DAY // 2
 # Clocks that count other units from other instants, each by what a clock counts at 1970 and in one
-# second: no inertial sensor has such steps or stamps in seconds or parts of them.
+# second: no inertial sensor has such steps or stamps in seconds or their parts.
 _MJD = "days of the modified Julian date"
 _EPOCHS: dict[str, tuple[float, float]] = {
     "days since 1899-12-30, as spreadsheets": (25_569.0, 1 / 86_400),
@@ -81,7 +81,7 @@ def is_stamp(field: str) -> bool:
 def _plain(field: str) -> str:
     """Write a date with its month in letters in numbers; any other text as it is.
 
-    The letters of another zone than UTC may be of several (EST, CST): such a text is no stamp.
+    The letters of another zone than UTC may be of several (EST, CST): such a text is not a stamp.
     """
     if (m := _BASIC.fullmatch(field)) is not None:
         return f"{m[1]}-{m[2]}-{m[3]} {m[4]}:{m[5]}:{m[6]}{m[7]}"
@@ -214,7 +214,7 @@ def _days(dates: set[str | None], order: str | None = None) -> dict[str | None, 
 def _in_order(
     parts: Mapping[str | None, Sequence[int]], order: Sequence[int]
 ) -> dict[str | None, int] | None:
-    """Return the days since 1970 of dates in an order of their parts; None if one is no date."""
+    """Return the days since 1970 of dates in an order of their parts; None if one is not a date."""
     out: dict[str | None, int] = {}
     for text, part in parts.items():
         year, month, day = (part[k] for k in order)

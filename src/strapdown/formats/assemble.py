@@ -327,7 +327,7 @@ MISSING_COUNTS, BEYOND = MISSING[2:5], 4.0
 
 
 def _take_out_codes(log: LogInUse) -> None:
-    """Put NaN in place of the numbers that stand for a missing value.
+    """Replace the numbers that mean a missing value by NaN.
 
     DataError: there are some, and rows may not be dropped.
     """
@@ -365,7 +365,7 @@ def _report_dates(log: LogInUse, source: str) -> None:
 
 
 def _take_memory(log: LogInUse) -> None:
-    """Put the columns of triads that were copied in place of those of the log."""
+    """Replace the columns of the log by those of triads that were copied."""
     for triad, block in log.values.items():
         for column, values in zip(log.columns(triad), block.T, strict=True):
             if log.raw.columns[column.source].dtype == values.dtype:
@@ -487,7 +487,7 @@ def _as_accelerometer(raw: RawLog, three: list[str]) -> dict[str, Any]:
 
 
 def _refuse_unit_of_nothing(raw: RawLog, found: dict[str, Column], unit: str) -> None:
-    """Refuse a unit that the user states for an accelerometer of which there is no column.
+    """Refuse a unit that the user states for an accelerometer without a column.
 
     A reader that left the accelerometer out has said so.
     """

@@ -2,7 +2,7 @@
 
 A date and a time of day; whole seconds and the part of a second; year, month, day, hour, minute and
 second; digits as 20240506093015; numbers of a name that states a multiple of a unit (``time_10us``)
-or an epoch (``LabVIEW time``). What is joined is reported.
+or an epoch (``LabVIEW time``). Joined columns are reported.
 """
 
 from __future__ import annotations

@@ -308,7 +308,7 @@ OFF_TICK = 0.1
 
 @dataclass(frozen=True)
 class EvenStamps:
-    """Stamps at a constant rate in place of those of a coarse clock, or shared by bursts.
+    """Stamps at a constant rate instead of those of a coarse clock, or shared by bursts.
 
     `ticks` ((n,)), `step`: in the unit of the stamps, like all others. `tick`, `off`: tick of a
     coarse clock, and largest distance of a stamp from it. `spread`, `size`: standard deviation of

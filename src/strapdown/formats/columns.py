@@ -157,7 +157,7 @@ def _read_name(name: str, of: Vocabulary, unit: str) -> ColumnName:
 
 #: Names of up to so many letters are kept with their meaning: a table asks for each several times.
 LONGEST = 100
-#: Longer names say nothing: those of a damaged file, in which searching takes minutes.
+#: Longer names have no meaning: those of a damaged file, in which searching takes minutes.
 MOST_LETTERS = 2000
 _read_once = lru_cache(maxsize=1 << 14)(_read_name)
 
@@ -174,7 +174,7 @@ def split_brackets(text: str) -> tuple[str, str]:
 
 
 def _of_format(text: str, index: str) -> ColumnName | None:
-    """Read names whose format defines quantity and unit; None if it is none of them.
+    """Read names whose format defines quantity and unit; None for another name.
 
     PX4; X-Plane; fields of a message as of ``rostopic echo -p``, with stamps in ns.
     """
@@ -228,7 +228,8 @@ def _read(bare: str, written: str, of: Vocabulary) -> ColumnName:
         (written and unit is None and written.lower() not in OF_TIME)
         or (kind and kind[0] != "time")
     ):
-        # A temperature or an angle is no clock; a text in brackets may be anything: time (of day).
+        # A temperature or an angle is not a clock; a text in brackets may be anything: time (of
+        # day).
         said = replace(said, quantity=None if of.sensors or kind else quantity)
     elif of.sensors and quantity in QUANTITIES[1:] and kind and kind[0] == "time":
         return ColumnName(None, said.unit)  # gyro_x_min

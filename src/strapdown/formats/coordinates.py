@@ -40,7 +40,7 @@ _HIGH = 2e4
 def with_degrees(raw: RawLog, found: Mapping[str, Found]) -> RawLog:
     """Write the columns of latitude and longitude as signed degrees; other columns as they are.
 
-    `found`: quantity to column. Another form than degrees is reported. DataError: a text is no
+    `found`: quantity to column. Another form than degrees is reported. DataError: a text is not an
     angle, or the unit of heights beside whole numbers of 1e-7 deg is open.
     """
     if raw.stated or not _ANGLES.keys() <= found.keys():

@@ -272,7 +272,7 @@ def _channel(channel: Channel, at: _Point, dummy: str) -> CrashChannel:
 
 
 def _body(channel: Channel, vehicles: set[int]) -> tuple[str, str]:
-    """Vehicle of a channel, empty for what is fixed to the ground, and the body of it."""
+    """Vehicle of a channel, empty for what is fixed to the ground, and its body."""
     location, seat = _code(channel)
     place = _PLACES.get(location, f"part {channel.location}")
     if channel.vehicle not in vehicles:

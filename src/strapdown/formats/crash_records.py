@@ -144,7 +144,7 @@ def files_named(paths: Sequence[Path]) -> set[Path]:
     """Return the files that the records among paths name as their own, resolved.
 
     A record of several files, such as a header with a file for each channel, is one: its other
-    files are part of it, and no records. What states itself a record is not among them.
+    files belong to it, and are not records. What states itself a record is not among them.
     """
     named: set[Path] = set()
     for path in paths:

@@ -202,7 +202,7 @@ def _sections(numbered: Lines) -> list[tuple[str, Lines]]:
 
 
 def _title(numbered: Lines, head: int, texts: Sequence[int]) -> str:
-    """Return the words of the line above names, if it is no row; or empty."""
+    """Return the words of the line above names, if it is not a row; or empty."""
     if head - 1 not in texts:
         return ""
     return numbered[head - 1][1].strip(" \t\"'#%/;![]:,=-*")
@@ -218,7 +218,7 @@ def _joined(
 ) -> RawLog:
     """Read tables below each other as logs of single sensors, on the stamps of the gyro.
 
-    DataError: none of them has a gyro.
+    DataError: none has a gyro.
     """
     from strapdown.formats.join import join
 
@@ -286,7 +286,7 @@ _PRINTED = re.compile(
     rf"|(?<![\w.^])[+-]{_UNSIGNED}|(?<![\w.^+-]){_UNSIGNED}|(?<!\w)[+-]?(?:nan|inf)(?!\w)",
     re.I,
 )
-# What is between the values of a vector, what ends a label, and what parts its words.
+# Signs between the values of a vector, at the end of a label, and between its words.
 _BETWEEN = re.compile(r"[,;/| \t-]+")
 _LABEL = re.compile(r"[^\W\d_].*[:=]\s*[\[({<]?$|[^\W\d_].*[\[({<]$", re.S)
 _MARKS_OF_PRINT = re.compile(r"([:=\[\](){}<>,;|]|\s-\s)")
@@ -297,7 +297,7 @@ _TRIMMED = " \t'\"*#>-"
 _LEVELS = {"E", "W", "I", "D", "V"}
 #: Longest line above the rows that is understood, and of labelled values.
 LONGEST = 2000
-#: Name of a number before or behind all labels, and of one that is no clock.
+#: Name of a number before or behind all labels, and of one that is not a clock.
 LEADING, COUNTED = "time", "number"
 #: Fewest values of a line that is taken for a row, and of a sample in several lines.
 LABELS, OF_SEVERAL = 3, 6
@@ -477,7 +477,7 @@ def _label(text: str, base: str) -> tuple[str, str, str]:
     """
     unit = ""
     text = text[_CLOSED.match(text).end() :]  # type: ignore[union-attr]
-    # A label of one letter may be spelled as a unit: then nothing is between it and the number.
+    # A label of one letter may be spelled as a unit: then it is next to the number.
     m = _FIRST_WORD.match(text)
     found = unit_of(m[1]) if m else None
     if m and found and (any(map(str.isalpha, m[2])) or not _LABEL.search(text)):

@@ -217,7 +217,7 @@ def _buffer(path: Path, name: str, findings: list[Finding]) -> NDArray[Any]:
 
 # smartLoc of TU Chemnitz (https://www.tu-chemnitz.de/projekt/smartLoc): CSV of raw GNSS data.
 #
-# A row is one pseudorange, in front of it the reference at its epoch, of a NovAtel SPAN system:
+# A row is one pseudorange, preceded by the reference at its epoch, of a NovAtel SPAN system:
 # ``GPSWeek [weeks]``, ``GPSSecondsOfWeek [s]``, longitude and latitude in degrees, height above
 # the ellipsoid, heading in rad from east, counterclockwise, speed along it, acceleration and yaw
 # rate. One rate and one acceleration are not three axes: the file gives positions, once an epoch.

@@ -235,7 +235,7 @@ def norm_and_spread(three: list[NDArray[Any]]) -> tuple[float, float]:
 def steady_triads(raw: RawLog, names: list[str]) -> list[tuple[list[str], float]]:
     """Return triads of columns of unknown names whose norm is that of gravity, or steady.
 
-    `names`: columns that nothing takes. Three belong together if their names differ in a letter x,
+    `names`: columns without a quantity. Three belong together if their names differ in a letter x,
     y or z, or in a number that counts; the vector of a quaternion, whose norm is steady too, has a
     fourth beside it. Returns the names, and the median norm.
     """
@@ -333,7 +333,7 @@ TURNED = 0.05
 def rates_and_force(columns: list[NDArray[np.generic]]) -> tuple[int, int] | None:
     """Return the numbers, from 0, of the first columns of the gyro and of the accelerometer.
 
-    `columns` ((n,) each): a column that is no number is None of a triad. None where no pair of
+    `columns` ((n,) each): a column that is not a number is None of a triad. None where no pair of
     triads explains the motion.
     """
     held = [_varied(c) for c in columns[:COMPARED]]
@@ -395,7 +395,7 @@ def advances(values: NDArray[Any]) -> bool:
     return usual > 0.0 and forward and bool(even > 0.9)
 
 
-#: Names of three axes, and the first of them in a name: no letter or digit of its kind beside it.
+#: Names of three axes, and the first one in a name: no letter or digit of its kind beside it.
 _SERIES = ("xyz", "XYZ", "012", "123")
 _FIRST = re.compile(r"[xX]|(?<!\d)[01](?!\d)")
 #: The letter of an axis at the end of a name, or before its unit.
@@ -623,7 +623,7 @@ def _answer(raw: RawLog, triad: str, family: Family) -> dict[str, str]:
 
 
 def reference(raw: RawLog, name: str) -> str:
-    """Name a column on the command line: by its number where the name has a separator of them."""
+    """Name a column on the command line: by its number where the name has their separator."""
     return str(list(raw.columns).index(name) + 1) if "," in name or "=" in name else name
 
 
@@ -649,7 +649,7 @@ def _one_clock(raw: RawLog, names: list[str]) -> list[str]:
     return names
 
 
-#: Rows that a clock may stand still for: a burst of samples.
+#: Rows over which a clock may not advance: a burst of samples.
 FEW = 50
 
 
@@ -685,9 +685,9 @@ _OF_TRIADS = {
 
 
 def stated_word(raw: RawLog, column: str, triad: str) -> str:
-    """Return the word that a file has in place of the unit of a sensor's column; empty if none.
+    """Return the word that a file has instead of the unit of a sensor's column; empty if none.
 
-    Of a row of units, or in brackets behind the name, where it is no unit of such a sensor.
+    Of a row of units, or in brackets behind the name, where it is not a unit of such a sensor.
     """
     text = raw.units.get(column, "").strip().strip("[]()").strip()
     text = text or split_brackets(column)[1].strip()
@@ -922,7 +922,7 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
             other = set(clocks) - {of_ublox[0], *asked.values()}
             names = [n for n in names if n not in other]
         elif len(clocks) > 1:
-            # A lone T is as often a temperature; a text that is no stamp is no clock.
+            # A lone T is as often a temperature; a text that is not a stamp is not a clock.
             other = {n for n in clocks if n == "T" or not is_clock(raw, n)} - set(asked.values())
             names = [n for n in names if n not in other or other >= set(clocks)]
         by_name = find_quantities(names, FIXES, asked, raw.name, raw.units)

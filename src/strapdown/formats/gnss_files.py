@@ -117,7 +117,7 @@ _OF_NAV_PVT, _LEAST_FIELDS = {"itow", "gspeed", "headmot", "headacc", "fixtype",
 def _of_ublox(raw: RawLog, found: dict[str, Found]) -> dict[str, Found]:
     """Give the columns of a table of UBX-NAV-PVT, in whole numbers, their units, and report it.
 
-    Programs scale some of them and leave others: a course that is none of whole numbers is in deg,
+    Programs scale some and leave others: a course that is none of whole numbers is in deg,
     and all others are whole, or none is taken so.
     """
     names = {plain_name(name) for name in raw.columns}
@@ -292,7 +292,7 @@ def _refuse_zone_open(raw: RawLog, found: dict[str, Found], values: Callable[[st
     raise raw.fault("io.utm-zone-open", of, east=east, north=north)
 
 
-#: Height above which nothing flies in air, m.
+#: Height above which no aircraft flies, m.
 _HIGHEST = 1e5
 
 
@@ -357,8 +357,8 @@ def _over_ground(
     """Return velocity by speed and course, and its standard deviation; down is unknown.
 
     Phones write -1 for a speed or a course that they do not know; None where they never do. Other
-    courses below zero are those of angles from -180 deg. `positions`: seconds, (n,), and places,
-    (n, 3): they tell the unit and the sense of a course of which the file states none.
+    courses below zero are those of angles from -180 deg. `positions`: seconds, (n,), and deg, deg,
+    m, (n, 3): they show the unit and the sense of a course of which the file states none.
     """
     speed, course = values("speed"), values("course")
     ahead = np.sign(found["speed"].factor)  # a minus is of a user, where courses point backward
@@ -386,7 +386,7 @@ def _over_ground(
 
 
 def _is_signed(course: Array) -> bool:
-    """Whether courses below zero are angles, and not all of them the -1 of a phone."""
+    """Whether courses below zero are angles, and not all the -1 of a phone."""
     below = course[course < 0.0]
     return bool(below.size and (below != -1.0).any())
 

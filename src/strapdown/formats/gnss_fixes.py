@@ -36,7 +36,7 @@ VELOCITY_SDS = "0.05 suits RTK, 0.3 a code receiver by Doppler, 1 one that diffe
 def utm_zone(text: str) -> tuple[int, bool]:
     """Return the zone of UTM, 1 to 60, and whether it is of the south, of ``33N``.
 
-    ConfigError: the text is no zone with its hemisphere.
+    ConfigError: the text is not a zone with its hemisphere.
     """
     match = re.fullmatch(r"\s*(?:UTM\s*)?(\d{1,2})\s*([NS])\s*", text, re.I)
     if match is None or not 1 <= int(match[1]) <= 60:
@@ -235,7 +235,7 @@ def _over_ellipsoid(fixes: Fixes, options: GnssOptions) -> Array:
 def _sd_of_stated_height(fixes: Fixes, asked: Sd | None, options: GnssOptions, count: int) -> float:
     """Return the standard deviation, m, of one height that is stated for all fixes.
 
-    All of them together say of the height what the statement does once, or its error, which is the
+    Together they say of the height what the statement does once, or its error, which is the
     same in each, would average out: the variance is that of the statement times their number.
     """
     sd = STATED_HEIGHT_SD if asked is None or np.ndim(asked) == 0 else float(np.asarray(asked)[2])

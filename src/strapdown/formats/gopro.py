@@ -357,7 +357,7 @@ def telemetry_of(path: Path) -> tuple[list[bytes], Array] | None:
 
 
 def _samples(table: bytes) -> tuple[list[int], list[int], Array]:
-    """Return sizes, places and durations of the samples of a track."""
+    """Return sizes, offsets and durations of the samples of a track."""
     stsz, stsc, stts = (next(_boxes(table, k)) for k in (b"stsz", b"stsc", b"stts"))
     size, count = struct.unpack_from(">II", stsz, 4)
     sizes = [size] * count if size else list(struct.unpack_from(f">{count}I", stsz, 12))

@@ -42,7 +42,7 @@ SETS = {
 
 
 def _has_monitor(path: Path) -> bool:
-    """Whether there are lines of Motion Studio above a table, or groups of it in HDF5."""
+    """Whether there are lines of Motion Studio above a table, or its groups in HDF5."""
     if first_bytes(path, 8) == SIGNATURE:
         return bool(_groups(path))
     text = head(path)
@@ -239,7 +239,7 @@ def _time(raw: RawLog) -> tuple[dict[str, tuple[NDArray[Any], str | None]], str]
     raise raw.fault("io.microstrain-without-stamps", "time")
 
 
-# x-IMU3 of x-io Technologies: CSV of its software, a folder of tables or one of them.
+# x-IMU3 of x-io Technologies: CSV of its software, a folder of tables or one table.
 #
 # ``Inertial.csv``: ``Timestamp (us)`` (or ``Time (s)``), ``Gyroscope X (deg/s)`` …,
 # ``Accelerometer X (g)`` …; ``Magnetometer.csv``: ``Magnetometer X (a.u.)`` …, in units of the

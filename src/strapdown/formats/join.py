@@ -196,7 +196,7 @@ def _onto(
         raise DataError("io.stamps-no-unit-those-other", file=mute.name, quantity="time")
     time, stamps = in_seconds(origin, origin), in_seconds(clock, origin)
     known = np.isfinite(time)
-    # Stamps without a unit are as in the log; what is said of them is in s by the likely one.
+    # Stamps without a unit are as in the log; messages about them are in s by the likely one.
     open_unit = origin.unit is None and int(known.sum()) > 1
     likely = infer_time_unit(origin.ticks[known]).value if open_unit else None
     factor = TIME_UNITS[str(likely)] if likely else 1.0

@@ -103,7 +103,7 @@ def names_of(path: Path) -> list[str]:
 
 
 def lacking(path: Path, stream: str, title: str, streams: Iterable[str]) -> DataError:
-    """Make the error for a file of a known format that lacks a stream, or all of them."""
+    """Make the error for a file of a known format that lacks a stream, or all streams."""
     name, there = path.resolve().name, list(streams)
     if there:
         return NoStreamError(name, stream, title, there)
@@ -115,7 +115,7 @@ def lacking(path: Path, stream: str, title: str, streams: Iterable[str]) -> Data
 # several units (``DeviceName``). Read as one log they are a body that jumps.
 
 
-#: Names of the column that tells sensors apart, without signs and blanks, in lower case.
+#: Names of the column that distinguishes sensors, without signs and blanks, in lower case.
 _OF_SENSORS = {
     *("i", "id", "instance", "imu", "imuid", "sensor", "sensorid", "sensorindex", "sensornumber"),
     *("device", "deviceid", "devicename", "unit", "unitid", "node", "nodeid", "board", "address"),

@@ -61,7 +61,7 @@ class Tile:
 
 
 class _Archive(Protocol):
-    """What each format gives."""
+    """Content of each format."""
 
     def metadata(self) -> dict[str, Any]:
         """Names and texts; any values."""
@@ -451,7 +451,7 @@ class ChosenTiles:
 
 @dataclass(frozen=True)
 class MapBox:
-    """A part of Web Mercator: ends from west to east and from north to south, as shares of it.
+    """A part of Web Mercator: ends from west to east and from north to south, as shares.
 
     `west`, `east`: of the whole Earth; may be below 0 or beyond 1 at the date line. `lat` (deg): of
     the corner nearest to a pole, without a sign.

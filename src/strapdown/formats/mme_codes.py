@@ -148,7 +148,7 @@ def _body(text: str, test_object: str, position: str, location: str) -> str:
         unlisted = not position and not any(main in _WORDS[table] for table in _LOCATIONS)
         fixed = main in _STRUCTURE or unlisted
         return "vehicle" if fixed else " ".join(f"{position} {location}".split())
-    # On the ground, or on an object of which nothing says how it moves.
+    # On the ground, or on an object whose motion is not stated.
     return (
         test_object if main == "0000" or location == test_object else f"{location}, {test_object}"
     )

@@ -258,7 +258,7 @@ LEAST_BLOCKS = 3  # of a stream that begins with something else
 CARTESIAN, GEODETIC, SENSORS = (4006, 5905, 5907), (4007, 5906, 5908), 4050
 UNKNOWN = -2e10
 RATE, FORCE = 1, 0  # types of a measurement
-# Kind of solution to field 6 of NMEA GGA: alone, differential, fixed place, RTK fixed and float,
+# Kind of solution to field 6 of NMEA GGA: alone, differential, fixed position, RTK fixed and float,
 # SBAS, the same of a moving base, PPP.
 QUALITY = {1: 1, 2: 2, 3: 7, 4: 4, 5: 5, 6: 2, 7: 4, 8: 5, 10: 2}
 WEEK_MS = 604_800_000

@@ -304,7 +304,7 @@ class Recording:
     temperature: pd.Series | None = None
 
 
-#: Answers that stand for a value which the numbers do not show: a unit, a rate.
+#: Answers for a value which the numbers do not show: a unit, a rate.
 PLACEHOLDERS = frozenset({"UNIT", "HZ"})
 
 

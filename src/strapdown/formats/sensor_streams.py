@@ -243,7 +243,7 @@ class SensorStreams:
     def _released(self, last: bool = False) -> list[Joined | Located]:
         """Return gyro samples whose other sensors have arrived, or have kept them waiting.
 
-        `last`: nothing more arrives.
+        `last`: no more samples arrive.
         """
         out: list[Joined | Located] = []
         accel = self._tracks[ACCEL]

@@ -28,7 +28,7 @@ class Signs:
     named: tuple[str, ...] = ()
     #: Endings that a file may have otherwise; any if empty.
     suffixes: tuple[str, ...] = ()
-    #: Regular expression that is found in the first `HEAD` bytes; a dot stands for any byte.
+    #: Regular expression that is found in the first `HEAD` bytes; a dot is any byte.
     first: bytes = b""
     #: Regular expression that is found in the text of these bytes; ``^`` and ``$`` are ends of a
     #: line. The text of binary content ends at its first zero byte.

@@ -265,7 +265,7 @@ def _is_by_columns(text: str) -> bool:
 def _by_columns(path: Path) -> RawLog:
     """Read the lists of an object as columns, and ``columns`` and ``data`` as pandas writes them.
 
-    DataError: it is no object, or has no numbers.
+    DataError: it is not an object, or has no numbers.
     """
     content = _unwrapped(from_json(path))
     if parts := _sensors_apart(content):
@@ -302,7 +302,7 @@ def _are_names(value: Any, width: int) -> bool:
 
 
 def _unwrapped(content: Any) -> Any:
-    """Return the one object in an object that has nothing else but words and numbers."""
+    """Return the one object in an object whose other values are words and numbers."""
     while isinstance(content, dict):
         inside = [v for v in content.values() if isinstance(v, dict | list)]
         if len(inside) != 1 or not isinstance(inside[0], dict):
@@ -314,7 +314,7 @@ def _unwrapped(content: Any) -> Any:
 def _sensors_apart(content: Any) -> dict[str, dict[str, list[Any]]]:
     """Return the columns of each sensor in an object of sensors, each with its own clock.
 
-    A sensor is an object of columns or a list of objects; empty if there are none of them.
+    A sensor is an object of columns or a list of objects; empty if there are none.
     """
     out: dict[str, dict[str, list[Any]]] = {}
     for name, held in content.items() if isinstance(content, dict) else ():
@@ -435,7 +435,7 @@ def _with_one_clock(raw: RawLog) -> RawLog:
 
 
 def _dates_of(values: list[Any]) -> NDArray[Any]:
-    """Return texts of ISO 8601 as dates of UTC; other values as they are, which nothing reads."""
+    """Return texts of ISO 8601 as dates of UTC; other values as they are, which are not read."""
     try:
         dates = pd.to_datetime(pd.Series(values), format="ISO8601", utc=True)
         return dates.dt.tz_localize(None).to_numpy()

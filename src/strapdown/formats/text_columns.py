@@ -165,7 +165,7 @@ def _blocks(source: bytes | Path, start: int) -> Iterator[bytes]:
             else:
                 yield block[:stop] if stop else _ended(block)
                 start, size = start + (stop or len(block)), BLOCK
-            # What is left of the last line is read again, which copies less than joining it.
+            # The rest of the last line is read again, which copies less than joining it.
             stream.seek(start)
 
 

@@ -132,7 +132,7 @@ def _of_track(
 ) -> RawLog:
     """Make a log of the points with a time, which is a text or seconds since 1970.
 
-    DataError: a time is no date.
+    DataError: a time is not a date.
     """
     stamps = np.array(["" if t is None else str(t) for t in times], dtype=object)
     dates = pd.to_datetime(pd.Series(stamps[timed]), format="ISO8601", utc=True, errors="coerce")
@@ -162,7 +162,7 @@ def read_geojson_fixes(path: Path) -> RawLog:
     Raises
     ------
     DataError
-        It is not JSON, a coordinate is no number, or no point has a time.
+        It is not JSON, a coordinate is not a number, or no point has a time.
     """
     content = from_json(path)
     times: list[Any] = []

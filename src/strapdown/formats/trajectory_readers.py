@@ -102,8 +102,8 @@ def find_trajectory_columns(
     """Find the column of each quantity.
 
     `names`: as in the file. `asked`: quantity (of `TRAJECTORIES`) to the name of its column, or
-    its number, from 1; overrides what the names suggest. `file`: for messages. Returns one for each
-    of them. ConfigError: a requested column does not exist, or its quantity is unknown.
+    its number, from 1; overrides what the names suggest. `file`: for messages. Returns one for
+    each. ConfigError: a requested column does not exist, or its quantity is unknown.
     DataError: a quantity is missing, two columns fit one quantity, or a unit does not fit.
     """
     columns = list(names)

@@ -225,7 +225,7 @@ def _report_scale_of_gyro(log: LogInUse, unit: str) -> None:
         )
 
 
-#: Length of a piece that may be steady, s, the largest spread of its norm, the fewest of them, also
+#: Length of a piece that may be steady, s, the largest spread of its norm, the fewest pieces, also
 #: as a share of all, and the spread of the middle half of their norms.
 _PIECE, _QUIET, _FEWEST, _OF_ALL, _ALIKE = 0.5, 0.02, 10, 0.1, 0.05
 #: Sizes of a steady force, relative to gravity, that are those of another scale; less is of none.

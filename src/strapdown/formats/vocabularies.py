@@ -1,7 +1,7 @@
 """Vocabularies of column names, as data: of logs, fixes, trajectories and crash records.
 
-`columns.read_name` reads a name by one of them. Names that mean the same in every kind of file
-(clocks, units, words of other languages) are in all of them.
+`columns.read_name` reads a name by one vocabulary. Names that mean the same in every kind of file
+(clocks, units, words of other languages) are in all.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def _words(text: str) -> tuple[str, ...]:
 
 
 #: Beginnings of German, French, Spanish, Italian and further words, without accents, by the English
-#: word that they stand for.
+#: word that they mean.
 ABROAD = {
     english: _words(stems)
     for english, stems in {
@@ -154,7 +154,7 @@ OF_TIME = {
     *_words("since start boot reboot local ros rosbag bag header rtc chip device lsl"),
 }
 TIME = Quantity((*TIMES, *CLOCKS), TIME_UNITS)
-#: Of tables of measurements, where a date stands for a clock.
+#: Of tables of measurements, where a date is a clock.
 DATED = Quantity((*TIME.words, "date"), TIME_UNITS)
 
 
@@ -233,7 +233,7 @@ NOISE = {
     # Counts, and revolutions or radians per second: the values say which.
     *("lsb", "rps", "轴", "軸", "축", "ось", "оси"),
 }
-#: Where a sensor is worn or mounted, and its range: they tell sensors apart, not quantities.
+#: Where a sensor is worn or mounted, and its range: they distinguish sensors, not quantities.
 PARTS = {
     *_words("head neck chest sternum trunk torso waist hip pelvis sacrum lumbar shoulder arm"),
     *_words("forearm elbow wrist hand thigh femur shank tibia knee calf leg ankle foot shoe"),

@@ -207,7 +207,7 @@ class CrashReception:
         return self.there
 
     def replay(self, journal: Journal) -> None:
-        """Process what the journal of a killed run has; nothing is written."""
+        """Process what the journal of a killed run has, without writing."""
         write, self._write = self._write, lambda text: None
         for said in journal.said():
             self.replayed += 1
@@ -216,7 +216,7 @@ class CrashReception:
         self._write = write
 
     def finish(self) -> None:
-        """Use what waits, if nothing contradicts it."""
+        """Use what waits, unless it is contradicted."""
         self._pass(self._gate.finish())
 
     def _check(self, said: Sample) -> None:
@@ -286,7 +286,7 @@ def receive_crash(
     source : LineSource or None
         None for what the journal has, and no more.
     write : callable
-        Called with each estimate of an event, as a line of JSON, that comes of a received line.
+        Called with each estimate of an event, as a line of JSON, that follows from a received line.
     warn : callable
         Called with each finding.
     every : float, s

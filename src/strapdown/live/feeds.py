@@ -1,7 +1,7 @@
 """Other receivers of `strapdown live`: datagrams, a serial port, phyphox, and MQTT.
 
 Datagrams are received by the event loop; the others in a thread of their own, which hands over
-what it got. Each of them goes on after an error: a phone that left the network, a plug that was
+what it got. Each one goes on after an error: a phone that left the network, a plug that was
 pulled, a broker that was restarted.
 """
 

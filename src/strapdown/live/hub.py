@@ -1,4 +1,4 @@
-"""Many devices at once: a session for each, and what all of them share.
+"""Many devices at once: a session for each, and what all share.
 
 Everything here runs in one thread, the event loop's: receivers in threads hand over what they got
 by `Hub.post`. A session is known by its protocol, its device and the recording that the device
@@ -73,7 +73,7 @@ class StateWriter:
         self._put(",".join("" if v is None else str(v) for v in values) + "\n")
 
     def said(self, said: Mapping[str, Any]) -> None:
-        """Write what is no state: as JSON alone."""
+        """Write what is not a state: as JSON alone."""
         if self._form == "json":
             self._put(json.dumps(said) + "\n")
 

@@ -53,14 +53,14 @@ from strapdown.live.lines import Measured, Sample, Word
 
 __all__ = ["Journal", "Said", "SpooledRows", "received_folder", "said_of"]
 
-#: What a journal holds: what lines said, and events of phones.
+#: Content of a journal: what lines said, and events of phones.
 Said = Sample | Measured | Word | Event
 
 LOCK = "lock"
 #: Interval at which written data are flushed to the disk, s.
 SYNCED = 1.0
 _RUN, _SEALED = b"R", b"E"
-#: Size of a journal in which nothing is.
+#: Size of an empty journal.
 HEAD = len(MAGIC) + FRAME.size + 65
 #: Bytes of rows that are kept in memory before they are written.
 ROOM = 1 << 16
@@ -205,7 +205,7 @@ class Journal:
         return self._spools[-1]
 
     def sealed(self, digest: str) -> None:
-        """Note that the result is written: nothing is left to recover."""
+        """Note that the result is written: recovery is not needed."""
         self._append(_SEALED + digest.encode())
 
     def close(self) -> None:
@@ -331,7 +331,7 @@ def _payload(said: Said) -> bytes:
 
 
 def _refuse_data(folder: Path) -> None:
-    """Refuse a folder with data of another run; what never received anything is no data."""
+    """Refuse a folder with data of another run; a journal without events is not data."""
     journal = folder / JOURNAL
     if journal.is_file() and journal.stat().st_size > HEAD:
         raise ConfigError(

@@ -164,7 +164,7 @@ def parse_line(
 def count_unused(
     unused: Counter[str], bad: BadLineError, line: int | None, warn: Callable[[Finding], None]
 ) -> None:
-    """Count a line that was not used, and tell the first of its kind."""
+    """Count a line that was not used, and report the first of its kind."""
     unused[bad.kind] += 1
     if unused[bad.kind] == 1:
         warn(Finding("live.line-not-used", line=line, reason=bad.finding))

@@ -33,7 +33,7 @@ LOOK = 0.1
 
 @dataclass(frozen=True)
 class LiveSources:
-    """Where samples come from; `listen` alone if nothing is given.
+    """Where samples come from; `listen` alone if none is given.
 
     Attributes
     ----------

@@ -247,7 +247,7 @@ class Reception:
     # Samples.
 
     def _check_sample(self, said: Sample) -> None:
-        """Refuse a sample that changes nothing."""
+        """Refuse a sample without effect."""
         self._limits.check(said)
         if said.time > self._gate.newest:
             self._behind = 0
@@ -331,7 +331,7 @@ class Reception:
     # Measurements.
 
     def _row(self, said: Measured, line: int | None) -> Row:
-        """Check a row; refuse one that changes nothing."""
+        """Check a row; refuse one without effect."""
         rows, name = self.rows[said.name], said.name
         if not abs(said.time) <= LATEST:
             raise BadLineError(

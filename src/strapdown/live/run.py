@@ -103,7 +103,7 @@ def receive(
     source : LineSource or None
         None for what the journal has, and no more.
     write : callable
-        Called with each line of the state that comes of a received line.
+        Called with each line of the state that follows from a received line.
     warn : callable
         Called with each finding.
     form, every

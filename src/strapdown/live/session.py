@@ -34,7 +34,7 @@ from strapdown.tables import EULER
 
 __all__ = ["Received", "Session", "SessionOptions"]
 
-#: What a device sends: events of its sensors, measurements and commands of lines.
+#: Input from a device: events of its sensors, measurements and commands of lines.
 Received = Event | Measured | Word
 State = dict[str, Any]
 Show = Callable[[State], None]
@@ -43,7 +43,7 @@ LATENCY = "latency.json"
 
 @dataclass(frozen=True)
 class SessionOptions:
-    """What every session computes.
+    """Options of every session.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class SessionOptions:
 
 
 class _Estimate(Protocol):
-    """What a session computes of its samples."""
+    """Estimate that a session computes from its samples."""
 
     def take(self, row: Joined | Located, arrived: float) -> None:
         """Use a sample or a fix."""
@@ -302,7 +302,7 @@ class Session:
                 self._use(self._estimate.say, one, arrived)
 
     def not_used(self, bad: BadLineError, line: int | None = None) -> None:
-        """Count what was not used, and tell the first of its kind."""
+        """Count what was not used, and report the first of its kind."""
         count_unused(self.unused, bad, line, self._warn)
 
     def finish(self) -> dict[str, Any]:
@@ -349,7 +349,7 @@ class Session:
     def _use(self, use: Callable[..., None], *given: Any) -> None:
         """Give the computation a sample, a measurement or its end.
 
-        An error of it ends the computation, not the journal.
+        Its error ends the computation, not the journal.
         """
         if self.error is not None:
             return

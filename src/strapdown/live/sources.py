@@ -34,7 +34,7 @@ class ReceivedLine:
     Attributes
     ----------
     number : int or None
-        Counted from 1; None of a message that is no line.
+        Counted from 1; None of a message that is not a line.
     arrived : float, s
         By the clock of the run.
     """

@@ -25,7 +25,7 @@ SAMPLES = 120
 def count_filter_cost(chosen: OrientationEstimator, step: float, magnetometer: bool) -> Cost:
     """Count the operations of one sample of a slowly turning body.
 
-    It takes a fifth of a comparison of short logs, and is the same for each of them.
+    It takes a fifth of a comparison of short logs, and is the same for each.
 
     Parameters
     ----------

@@ -153,7 +153,7 @@ def slow_velocity(imu: pd.DataFrame, run: FilterRun) -> float:
 
     A tilt, which is as good as constant within a window, makes a velocity grow along a straight
     line; that line is taken off. Gyros rotate the specific force within a window, and the first run
-    levels its start. Windows with a gap do not count; 0 if there is no other.
+    levels its start. Windows with a gap do not count; 0 without another.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     force = imu[ACCEL].ffill().to_numpy(dtype=np.float64)

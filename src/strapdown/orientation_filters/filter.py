@@ -294,7 +294,7 @@ def run_filter(
     Raises
     ------
     DataError
-        There is no accelerometer, or a rate is not finite.
+        An accelerometer is missing, or a rate is not finite.
     DivergenceError
         The filter left the range of floating point.
     """
@@ -402,9 +402,9 @@ class OrientationTracker:
         gyro : array_like, (3,), rad/s
             Body rate, forward-right-down.
         accel : array_like, (3,), m/s², optional
-            Specific force; None or NaN if there is no new sample.
+            Specific force; None or NaN without a new sample.
         mag : array_like, (3,), optional
-            Magnetic field in any unit; None or NaN if there is no new sample.
+            Magnetic field in any unit; None or NaN without a new sample.
 
         Raises
         ------

@@ -244,7 +244,7 @@ def _exchange(asked: dict[str, Any], label: str, limits: tuple[int, int, Room | 
 
 
 def _asked(request: bytes, label: str) -> subprocess.Popen[bytes]:
-    """Send a request; a process that was ended while it had nothing to do is started again."""
+    """Send a request; a process that was ended while it was idle is started again."""
     for again in (False, True):
         try:
             process = _running()
@@ -312,7 +312,7 @@ def _death(code: int, label: str, seconds: float, memory: int) -> DataError:
 
 
 def _taken(answer: Any, label: str, memory: int) -> Any:
-    """Return what was asked for, or raise what it says; nothing of it is trusted."""
+    """Return what was asked for, or raise what it says; the answer is not trusted."""
     if isinstance(answer, dict) and "done" in answer:
         return answer["done"]
     failed = answer.get("failed") if isinstance(answer, dict) else "no answer"

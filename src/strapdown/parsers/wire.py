@@ -1,8 +1,8 @@
 """What passes between this process and the one that parses files: JSON and raw arrays.
 
-An answer is a tree of dictionaries, lists, text, numbers, dates, bytes and arrays. Its JSON stands
-first, with a place for each array, whose dtype, shape and bytes follow. Nothing is executed that
-arrives: there is no pickle, dtypes are those of a list, and sizes are checked before memory is
+An answer is a tree of dictionaries, lists, text, numbers, dates, bytes and arrays. Its JSON is
+first, with a slot for each array, whose dtype, shape and bytes follow. Nothing is executed that
+arrives: pickle is not used, dtypes are those of a list, and sizes are checked before memory is
 taken, because the sender has parsed a file that nobody vouches for.
 """
 

@@ -50,7 +50,7 @@ def main() -> None:
     os.dup2(nothing, 0)
     os.dup2(nothing, 1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # Arrow would import it to convert columns: 0.3 s for nothing that is used here.
+    # Arrow would import it to convert columns: 0.3 s for no function that is used here.
     sys.modules["pandas"] = None  # type: ignore[assignment]
     requests = os.fdopen(source, "rb")
     locked = False

@@ -231,7 +231,7 @@ def steadiness(dt: Array, label: str, source: str | None) -> Finding | None:
 
 
 def align_heading(q: ArrayLike, known: ArrayLike, row: int = 0) -> Array:
-    """Rotate attitudes about the vertical so that one of them comes nearest to a known one.
+    """Rotate attitudes about the vertical so that one comes nearest to a known one.
 
     Parameters
     ----------

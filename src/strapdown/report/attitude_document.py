@@ -41,7 +41,7 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
     """Return the report of a bench; its charts are drawn here unless they are given."""
     chart = {c.slug: c for c in (charts(bench) if drawn is None else drawn)}.get
     answer = bench.answer
-    # Warnings stand beside the answer; notes and remedies follow below.
+    # Warnings are beside the answer; notes and remedies follow below.
     warnings = [
         f"{f.quantity}: {f.sentence('python')}." if f.quantity else f"{f.sentence('python')}."
         for f in bench.findings

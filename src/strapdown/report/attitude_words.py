@@ -187,7 +187,7 @@ def facts(bench: AttitudeComparison) -> list[tuple[str, str]]:
 
 
 def premises(initial: Mapping[str, Any], gyro_bias: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """What the attitude of a run begins with, by the tables of these names in its JSON."""
+    """Premises of the attitude of a run, by the tables of these names in its JSON."""
     i, removed = initial, str(gyro_bias["from"])
     if (bias := gyro_bias["rad_per_s"]) is not None:
         values = ", ".join(f"{math.degrees(v):.4f}" for v in bias)

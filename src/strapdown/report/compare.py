@@ -162,7 +162,7 @@ class RunComparison:
     tracks, curves : tuple of tuple
         Of each run: trajectories; cones of an outage, errors over rates.
     seconds : tuple of dict
-        Times taken by stage, indicative: they stand outside of the seals.
+        Times taken by stage, indicative: they are outside of the seals.
     findings : tuple of Finding
         What limits the comparison; a run that was changed after it was sealed.
     """
@@ -339,7 +339,7 @@ def compare_results(
     ----------
     given : sequence of (str, Path or run)
         Folders of results; TOML files of `navigate`, `align` or `crash`; runs in memory, named by
-        their place.
+        their index.
     progress : callable, optional
 
     Returns
@@ -350,10 +350,10 @@ def compare_results(
     Raises
     ------
     ConfigError
-        Fewer than two runs are given, one is given twice, a configuration is faulty, or the runs
-        have nothing in common.
+        Fewer than two runs are given, one is given twice, a configuration is faulty, or runs of
+        different commands have no option and no input in common.
     DataError
-        A folder is no result, or its files are damaged.
+        A folder is not a result, or its files are damaged.
     """
     if len(given) < 2:
         raise ConfigError("compare.one-run", quantity="RUN", count=len(given))
@@ -544,7 +544,7 @@ def _check(path: Path) -> None:
 
 
 def _kind_of(path: Path) -> str:
-    """Command of a configuration: by the keys that only one of them has, else navigation."""
+    """Command of a configuration: by the keys that only one command has, else navigation."""
     keys = set(read_toml(path).table)
     forms: dict[str, type[FileSpec]]
     forms = {"navigate": NavigationSpec, "align": AlignmentSpec, "crash": CaseSpec}

@@ -134,7 +134,7 @@ def _panel(result: RunComparison, own: Sequence[Difference], name: str, two: boo
             factor * one.table[f"{name}_{key}"].to_numpy(dtype=np.float64)
             for key in ("combined", "first", "other")
         )
-        # Of a distance there is no lower bound.
+        # A distance has no lower bound.
         signs = (1.0,) if name == "horizontal" else (1.0, -1.0)
         if not two:
             for sign in signs:

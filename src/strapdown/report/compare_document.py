@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 SAME, NONE = "same", "–"
 #: Distance of two positions that is rounding alone, m.
 SAME_PLACE = 1e-9
-#: What a computation in double precision leaves of zero, in any unit that is shown.
+#: Rounding of zero in double precision, in any unit that is shown.
 ROUNDING = 1e-9
 METHOD = (
     "Options are those of the sealed configurations, which have every default: a default that one "
@@ -355,7 +355,7 @@ def _cells(row: NumberRow, result: RunComparison, two: bool) -> Iterator[str]:
     said = shown_row(row, result.units)
     metres = f"{GAP}m" if row.any.kind in ("lat", "lon") else ""
     yield f"{row.any.label}, {said['unit']}" if said["unit"] else row.any.label
-    # Of equal places, "same" has no unit.
+    # Of equal positions, "same" has no unit.
     apart = [
         text + (metres if text and number else "")
         for text, number in zip(said["differences"], row.differences, strict=True)

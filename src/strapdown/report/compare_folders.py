@@ -75,7 +75,7 @@ RUN = OWN_TABLE["navigate"]
 DESCRIPTIONS = ("title", "number", "author", "description")
 #: Deepest table of a configuration, and longest word of a result that is compared.
 DEEPEST, LONGEST = 24, 300
-#: Digits of a digest that tell files of one name apart.
+#: Digits of a digest that distinguish files of one name.
 DIGITS = 8
 
 
@@ -172,7 +172,7 @@ def open_run(path: Path, name: str, *, ran: bool = False) -> SealedRun:
 
     A folder without a manifest that has those of vehicles, ``1``, ``2`` …, is one of a crash.
 
-    DataError: it is no folder of a result, its manifest is damaged, or it has symbolic links,
+    DataError: it is not a folder of a result, its manifest is damaged, or it has symbolic links,
     which are not followed.
     """
     roots = [path]
@@ -197,7 +197,7 @@ def open_part(root: Path, label: str = "") -> RunPart:
 
 
 def shown_names(paths: Sequence[Path]) -> list[str]:
-    """Return a name for each path: its last part, and as many parts above it as tell them apart."""
+    """Return a name for each path: its last part, and as many parts above it as they need."""
     parts = [path.absolute().parts for path in paths]
     longest = max(map(len, parts), default=0)
     for count in range(1, longest):
@@ -221,10 +221,10 @@ class OptionRow:
 def option_rows(runs: Sequence[SealedRun]) -> tuple[tuple[OptionRow, ...], int]:
     """Return the options that differ, and how many are equal.
 
-    Sealed configurations have every default, so that a default that one of them states is no
+    Sealed configurations have every default, so that a default that one states is not a
     difference. The files of inputs are compared by `input_rows`; a file that stands for a name of
-    a catalogue is compared by its digest. Of runs of different commands, the options that all of
-    them have.
+    a catalogue is compared by its digest. Of runs of different commands, the options that all
+    have.
     """
     every = [options_of(run) for run in runs]
     several = len({run.command for run in runs}) > 1
@@ -492,7 +492,7 @@ def _findings(answer: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
                 seen.add(one["code"])
 
 
-# Times, which stand outside of the seal.
+# Times, which are outside of the seal.
 
 
 def seconds(run: SealedRun) -> dict[str, float]:

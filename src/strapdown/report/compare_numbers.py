@@ -79,11 +79,11 @@ def values_of(part: RunPart) -> Iterator[Value]:
         yield from _every(part.answer, "", 0)
 
 
-# Access to data of which nothing is certain.
+# Access to data of an unknown form.
 
 
 def _at(node: Any, *path: str | int) -> Any:
-    """Value at a place; None if there is none."""
+    """Value at a path; None if there is none."""
     for part in path:
         if isinstance(node, dict):
             node = node.get(part)
@@ -95,7 +95,7 @@ def _at(node: Any, *path: str | int) -> Any:
 
 
 def _number(node: Any, *path: str | int) -> float | None:
-    """A finite number at a place."""
+    """A finite number at a path."""
     found = _at(node, *path)
     if isinstance(found, bool) or not isinstance(found, int | float):
         return None
@@ -365,7 +365,7 @@ def _attitude(part: RunPart) -> Iterator[Value]:
         yield from _row(key, group, label, value, "deg", detail=True)
 
 
-#: What a lower rate is made of.
+#: Parts of a lower rate.
 MEANINGS = {"sum": "averaged", "drop": "decimated"}
 
 
@@ -646,9 +646,9 @@ NUMBERS: dict[str, Callable[[RunPart], Iterator[Value]]] = {
     "doctor": _doctor,
 }
 
-# Any other result: every number of its JSON, by its place.
+# Any other result: every number of its JSON, by its path.
 
-#: Deepest place, and longest list, of such a result.
+#: Deepest path, and longest list, of such a result.
 DEEPEST, MOST = 8, 12
 #: Keys that describe a result.
 ABOUT = ("findings", "conventions", "configuration", "schema", "strapdown")

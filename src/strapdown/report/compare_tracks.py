@@ -282,7 +282,7 @@ def differences(
 ) -> tuple[tuple[Difference, ...], tuple[Finding, ...]]:
     """Return the differences of a run's tracks from those of the first run with the same label.
 
-    `run`, `name`: place and shown name of the run. Findings say what has no difference, and why.
+    `run`, `name`: index and shown name of the run. Findings say what has no difference, and why.
     """
     out: list[Difference] = []
     findings: list[Finding] = []

@@ -4,7 +4,7 @@ Another processor or library may round the last digits of a number differently, 
 may draw a page differently. Compared, by kind of file:
 
 * tables and arrays: the numbers of a column within `EQUAL` of its spread; words, units, comments
-  and names exactly; JSON: a number within `EQUAL` of itself; places within `PLACE`, times and
+  and names exactly; JSON: a number within `EQUAL` of itself; positions within `PLACE`, times and
   angles within `EQUAL` of a second and a degree;
 * HTML, SVG, KML, GeoJSON and other text: everything between the numbers exactly, the numbers within
   one unit of their last digit, whole numbers exactly;
@@ -12,7 +12,7 @@ may draw a page differently. Compared, by kind of file:
 
 Where other versions drew (another page, other fonts), the text of a page, an SVG or a PDF is
 extracted and compared in that way; `Comparison.drawing` then says that the rest was not compared.
-A picture of points is not compared: its figure as SVG stands beside it.
+A picture of points is not compared: its figure as SVG is beside it.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ __all__ = ["EQUAL", "Comparison", "compare_files"]
 EQUAL = 1e-6
 #: Latitude and longitude: a tenth of a millimetre.
 PLACE = 1e-9  # deg
-# Differences of numbers that are nothing but rounding, in any unit.
+# Differences of numbers that are rounding alone, in any unit.
 _ROUNDING = 1e-12
 #: Readers of arrays, in a process of their own, and whether the file is as long as what it holds.
 ARRAYS = {
@@ -174,7 +174,7 @@ _Leaf = tuple[tuple[str | int, ...], str, Any]
 
 
 def _leaves(value: Any, path: tuple[str | int, ...] = (), key: str = "") -> Iterator[_Leaf]:
-    """Every value in JSON with its place and the name of its field; an empty list, too."""
+    """Every value in JSON with its path and the name of its field; an empty list, too."""
     if isinstance(value, dict) and value:
         for name, item in value.items():
             yield from _leaves(item, (*path, name), name)
@@ -244,7 +244,7 @@ def _apart(name: str, one: NDArray[Any], two: NDArray[Any], scale: float) -> flo
     """Largest difference, as a part of `scale`; infinite if one is not a number.
 
     A difference that is rounding alone counts as a part of one, and what may be `EQUAL` is less for
-    places, times and angles, whose numbers may be large.
+    positions, times and angles, whose numbers may be large.
     """
     if not {one.dtype.kind, two.dtype.kind} <= set("fiu"):
         return 0.0 if np.array_equal(one, two) else math.inf

@@ -497,7 +497,7 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
 
 
 def _force_words(result: CaseResult) -> Iterator[str]:
-    """What the difference from a measured force holds."""
+    """Parts of the difference from a measured force."""
     for name, impulse in result.deformation.impulses:
         for answer in result.references:
             if answer.spec.name == name and answer.unit == result.reconstruction.main.name:

@@ -279,7 +279,7 @@ def assumed(*texts: str) -> tuple[Block, ...]:
 
 
 def run_again(name: str) -> tuple[Block, ...]:
-    """Return the command that verifies a folder; nothing without its name."""
+    """Return the command that verifies a folder; empty without the name of the folder."""
     if not name:
         return ()
     return (

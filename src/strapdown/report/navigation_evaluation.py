@@ -396,7 +396,7 @@ def distance_over_ground(trajectory: pd.DataFrame) -> float:
 
 
 # Errors of one run are correlated in time, so less than 95 % may lie within a good bound, and of an
-# error that hardly changes all or nothing. Then it counts how rarely one as large occurs with right
+# error that hardly changes all or none. Then it counts how rarely one as large occurs with right
 # bounds: at most one in twenty of such runs is refuted by any of its quantities.
 _ENOUGH, _RARE = 0.8, 0.05
 # Share of the epochs; more rejected epochs are not outliers.

@@ -529,7 +529,7 @@ def cone_chart(result: OutageRun) -> Chart:
 
 
 def _tried(result: OutageRun) -> str:
-    """What the curve is over, and why it can fall."""
+    """Abscissa of the curve, and why it can fall."""
     many, said = len(result.equal), ""
     if many > 1:
         said = (

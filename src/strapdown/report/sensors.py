@@ -215,8 +215,8 @@ def catalogue_table(sensors: Sequence[Sensor] = ()) -> pd.DataFrame:
     -------
     DataFrame
         ``name``, ``class``, noise, bias instability and bias of both triads (NaN where a sensor has
-        none; units in the names), ``figures`` and ``assumed``: how many there are, and how many of
-        them have no source.
+        none; units in the names), ``figures`` and ``assumed``: how many there are, and how many
+        have no source.
     """
     rows = []
     for one in sensors or [load_sensor(name) for name in SENSORS]:

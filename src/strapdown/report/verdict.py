@@ -143,7 +143,7 @@ def heading_sentence(
 
 
 def worst_words(trust: IntegrityReport) -> str:
-    """Return the quantity that its measurements contradict for the longest time; or nothing."""
+    """Return the quantity that its measurements contradict for the longest time; or empty."""
     worst = trust.worst
     if worst is None:
         return ""
@@ -187,7 +187,7 @@ def promise(trust: IntegrityReport) -> tuple[tuple[str, str], ...]:
     )
 
 
-#: A maneuver that leaves more of a standard deviation than this share is no help.
+#: A maneuver that leaves more of a standard deviation than this share does not help.
 HELPS = 0.8
 
 

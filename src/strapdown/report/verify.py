@@ -203,7 +203,7 @@ def verify(
 
 
 def _of_recorded_name(moved: dict[str, Path], folder: Path) -> dict[str, Path]:
-    """Give an input that has another name now its recorded one, which stands in the result."""
+    """Give an input that has another name now its recorded one, which is in the result."""
     found = {}
     for number, (name, path) in enumerate(moved.items()):
         place = path
@@ -250,7 +250,7 @@ def _beside_the_seal(root: Path, signer: str | Path | None) -> list[Finding]:
 
 
 def _is_ours(root: Path, manifest: dict[str, Any]) -> bool:
-    """Whether a manifest says nothing twice, in which readers could differ, and nothing unknown."""
+    """Whether a manifest repeats no name or key, so that readers agree, and has none unknown."""
     try:
         json_of((root / MANIFEST).read_text(encoding="utf-8"))
     except ValueError:
@@ -278,7 +278,7 @@ def _compare(
     now = read_manifest(again)
     written = {item["name"]: sha256(again / item["name"]) for item in now["outputs"]}
     sealed = {item["name"]: item["sha256"] for item in manifest["outputs"]}
-    # An extra, of which results without PDF and PNG know nothing.
+    # An extra, which results without PDF and PNG do not need.
     typeset = any(name.endswith((".pdf", ".png")) for name in sealed)
     conditions = [c for c in _other_conditions(manifest) if typeset or c.data["name"] != "typst"]
     alike = not any(found.data["name"] in DRAWING for found in conditions)

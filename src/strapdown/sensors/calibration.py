@@ -127,7 +127,7 @@ class ImuCalibration:
         J[:, :, 3:6] = np.einsum("ni,ij->nij", up, np.eye(3))
         for k, (i, j) in enumerate(indices_of(PAIRS)):
             J[:, i, 6 + k], J[:, j, 6 + k] = up[:, j], up[:, i]
-        # What is along the vertical changes the size alone.
+        # A component along the vertical changes the size alone.
         J -= np.einsum("ni,nj,njk->nik", up, up, J)
         rows = J.reshape(-1, 9)
         return np.asarray(rows @ self.covariance[:9, :9] @ rows.T)
@@ -221,7 +221,7 @@ def _solve(problem: CalibrationProblem, z: Array) -> Array:
             for node, up in zip(problem.nodes, directions, strict=True):
                 node.up = up
             damping = max(4.0 * damping, LEAST_DAMPING)
-        # A damped step is short, and says nothing of how far the maximum is.
+        # A damped step is short, and does not show how far the maximum is.
         z, settled = tried, damping < 1.0 and abs(cost - new) < 1e-6 * (1.0 + new)
         cost, damping = new, 0.25 * damping if damping > LEAST_DAMPING else 0.0
         if settled:
@@ -407,7 +407,7 @@ CASE: Triad = triad_of(PRIOR.accel.axis("misalignment")[k] / math.sqrt(2.0) for 
 
 @dataclass(frozen=True, eq=False)
 class SensorCalibration:
-    """Known errors of a sensor and what is left of them: the file ``calibration.toml``.
+    """Known errors of a sensor and what is left: the file ``calibration.toml``.
 
     Attributes
     ----------
@@ -623,7 +623,7 @@ class SensorCalibration:
         return [f"{head} {' '.join(axes)}" for head, axes in groups.items()]
 
     def findings(self, log: str, name: str) -> tuple[Finding, ...]:
-        """What is left, and how the axes may lie in the case: 95 % bounds of the worst axis."""
+        """Remaining errors, and how the axes may lie in the case: 95 % bounds of the worst axis."""
         data: dict[str, Any] = {"calibration": name}
         for triad, unit in (("gyro", math.pi / 648000.0), ("accel", 1e-3 * STANDARD_GRAVITY)):
             sd = getattr(self, triad)
@@ -636,7 +636,7 @@ class SensorCalibration:
         )
 
     def uncertainty(self, stated: ImuUncertainty) -> ImuUncertainty:
-        """What a sensor's errors are known to after this calibration; noise and drift as stated.
+        """Uncertainty of a sensor's errors after this calibration; noise and drift as stated.
 
         Of a parameter that the calibration did not show, the data sheet may say more.
         """

@@ -48,7 +48,7 @@ PRIOR = ImuUncertainty(
 )
 #: Change of bias with temperature, per °C, before the log is read.
 TEMPERATURE_PRIOR = (0.1 * DEG, 0.02)
-#: Gravity of an unknown place: mean over latitudes, and standard deviation, m/s².
+#: Gravity at an unknown position: mean over latitudes, and standard deviation, m/s².
 GRAVITY, GRAVITY_SD = 9.806, 0.016
 #: Least excess over noise of the mean force of a rest, m/s², and of turns, rad; residuals that the
 #: usual variance counts as.
@@ -68,7 +68,7 @@ AXIS_SD, CASE_SD, ARM_SD = 4.0 * DEG, 2.0 * DEG, 0.05
 LEVEL_SD = 0.02
 #: Change of the gyro bias from log to log, by temperature and switching on, rad/s.
 BETWEEN_SD = 0.05 * DEG
-#: Drift of the gyro bias where nothing shows it, rad/s/√s.
+#: Drift of the gyro bias where data do not show it, rad/s/√s.
 LEAST_DRIFT = 5e-6
 #: Longest path of a rotation between stops that the model follows, rad: two revolutions and a half.
 LONGEST = 5.0 * math.pi
@@ -76,7 +76,7 @@ LONGEST = 5.0 * math.pi
 
 @dataclass(frozen=True)
 class CalibrationConditions:
-    """What is known beside the samples.
+    """Conditions known beside the samples.
 
     Attributes
     ----------
@@ -552,7 +552,7 @@ class CalibrationProblem:
         covariance: Array,
         kinds: Sequence[tuple[str, int, int]],
     ) -> tuple[float, float]:
-        """Sum of squares of the residuals of a kind, and how many of them are free."""
+        """Sum of squares of the residuals of a kind, and how many are free."""
         spans = [np.arange(a, b) for k, a, b in kinds if k == kind]
         if not spans:
             return 0.0, 0.0

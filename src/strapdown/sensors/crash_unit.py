@@ -428,7 +428,7 @@ def turning_shapes(time: Array, over: tuple[float, float], sampling: str, pushed
 
 
 def _intervals(time: Array, sampling: str) -> tuple[Array, Array]:
-    """Begin and end of the interval that each sample stands for, (n,) each, without gaps."""
+    """Begin and end of the interval that each sample represents, (n,) each, without gaps."""
     steps = np.diff(time, prepend=2.0 * time[0] - time[1])
     if sampling == "mean":
         return time - steps, time

@@ -40,7 +40,7 @@ COVERED = 0.02
 #: Change of direction beside its standard deviation from which a calibration is applied.
 WORTH = 2.0
 #: Most scatter of the calibrated strength beside that of the readings, as shares of their fields: a
-#: center that is moved toward readings that cover little explains none of it.
+#: center that is moved toward readings that cover little does not explain it.
 STEADIER = 0.9
 #: Direction that iron leaves open and that is worth a warning, deg.
 OPEN = 3.0
@@ -143,10 +143,11 @@ def calibrate_magnetometer(mag: ArrayLike) -> MagnetometerCalibration:
 
     Notes
     -----
-    Maximum posterior by Gauss-Newton steps, with the weights of Huber. Readings at one place have
-    correlated residuals, as the field differs from place to place: their information is divided by
-    the integrated correlation time, in rows (Priestley, Spectral Analysis and Time Series, 5.3.2).
-    A rotation of the magnetometer leaves every strength as it is: `calibrate_by_poses` finds it.
+    Maximum posterior by Gauss-Newton steps, with the weights of Huber. Readings at one position
+    have correlated residuals, as the field differs from place to place: their information is
+    divided by the integrated correlation time, in rows (Priestley, Spectral Analysis and Time
+    Series, 5.3.2). A rotation of the magnetometer leaves every strength as it is:
+    `calibrate_by_poses` finds it.
     """
     rows = _readings(as_array(mag, 3, "mag"))
     if len(rows) < LEAST:
@@ -274,7 +275,7 @@ def _readings(mag: Array) -> Array:
 
 
 def _scatter(mag: Array) -> float:
-    """Scatter of the strength, as a share of it, of the readings that are there."""
+    """Relative scatter of the strength of the readings that are there."""
     strength = np.linalg.norm(_readings(mag), axis=1)
     return float(strength.std() / strength.mean()) if strength.size else 0.0
 
@@ -296,7 +297,7 @@ class _Fit:
 
 
 def _sphere(m: Array) -> Array:
-    """Start: center and radius by linear least squares, held near zero where nothing shows them."""
+    """Start: center and radius by linear least squares, held near zero where they do not show."""
     design = np.column_stack([2.0 * m, np.ones(len(m))])
     ridge = np.diag([1e-3, 1e-3, 1e-3, 0.0]) * len(m)
     a = np.linalg.solve(design.T @ design + ridge, design.T @ (m * m).sum(axis=1))

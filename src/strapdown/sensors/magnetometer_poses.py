@@ -36,7 +36,7 @@ ROTATION_PRIOR, LEAST_RESTS = 0.05, 5
 SWAPPED = 10.0
 #: Means of the readings of a motion, each of one reading at least; readings of all at most.
 MEANS, MOST = 16, 20_000
-#: Scatter of the field, as a share of it, over which the likelihood is summed.
+#: Relative scatter of the field over which the likelihood is summed.
 SCATTERS = np.geomspace(1e-4, 0.3, 33)
 #: Correlation of the errors of strength and vertical part beside that of a scatter that is equal
 #: along all axes: people and cars do not choose an axis, and yet it need not be equal.
@@ -77,7 +77,7 @@ def calibrate_by_poses(
     Each rest gives two numbers: the strength of the field, and its part along the vertical, which
     keep their values in all poses, whatever the heading (dot product invariance: Kok, Hol, Schön,
     Gustafsson and Luinge, FUSION 2012; Li, Li, IEEE Trans. Instrum. Meas. 61, 2012). The field of a
-    pose differs from that of all by a random vector (people, cars and the place of the sensor
+    pose differs from that of all by a random vector (people, cars and the position of the sensor
     change it), which both numbers share; more samples of a rest do not reduce it. Its standard
     deviation s has the prior 1/√s, between Jeffreys's and a uniform one (Gelman, Bayesian Analysis
     1, 2006), with which bounds of simulated sensors are neither too wide nor too narrow, and is
@@ -233,7 +233,7 @@ class _Fit:
     ) -> MagnetometerCalibration:
         """The calibration in the unit of the readings."""
         of_iron = covariance[np.ix_(IRON, IRON)]
-        # What the readings alone say of the iron, beside none.
+        # Iron by the readings alone, beside none.
         alone = np.linalg.inv(of_iron) - np.diag(self.prior[IRON])
         said = np.linalg.solve(of_iron, self.x[IRON])
         gained = float(said @ np.linalg.lstsq(alone, said, rcond=1e-9)[0])

@@ -367,7 +367,7 @@ def pooled_terms(
     steps : sequence of float, s
         Sample interval of each.
     temperatures : sequence of array_like, (n,), °C, or None
-        The effect is estimated with the noise, and is not part of it.
+        The effect is estimated with the noise, and is excluded from it.
     known : dict, optional
         Kept from one channel to the next of the same records, whose covariances have one shape.
 
@@ -578,7 +578,7 @@ def _intervals(record: _Record, fits: list[_Fit], best: _Fit) -> list[NoiseTerm]
 
 
 def _drives(fit: _Fit, name: str, low: float, high: float) -> bool:
-    """Whether a process as slow as can be told from a random walk is driven by the same noise."""
+    """Whether the slowest process that differs from a random walk is driven by the same noise."""
     if name != "K" or not fit.edge:
         return False
     return low / SAME <= 2.0 * fit.variance("GM") / fit.correlation <= SAME * high

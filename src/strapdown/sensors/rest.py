@@ -420,7 +420,7 @@ def could_be_a_turn(rest: RestStretch) -> bool:
     """Whether the mean rate of a rest could be that of a steady turn about the vertical.
 
     About another axis than the vertical a turn would tilt the specific force. True as well if the
-    rate exceeds 1 deg/s and there is no specific force.
+    rate exceeds 1 deg/s and specific force is missing.
     """
     mean = np.array(rest.gyro_mean)
     if rest.accel_mean is None:

@@ -82,7 +82,7 @@ WIDEST, MOST_POINTS = 20_000, 50_000
 
 @dataclass
 class Studio:
-    """What the routes share.
+    """State that the routes share.
 
     Attributes
     ----------
@@ -260,7 +260,7 @@ async def propose(studio: Studio, request: Request) -> Response:
 
 
 async def check(studio: Studio, request: Request) -> Response:
-    """Check a configuration, and change keys of it."""
+    """Check a configuration, and change its keys."""
     asked = await body(request, kind=str, toml=str, set=dict, name=str)
     found = await studio.ask(
         "check",

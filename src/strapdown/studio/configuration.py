@@ -250,7 +250,7 @@ def edited(text: str, changes: Mapping[str, Any]) -> str:
     Raises
     ------
     ConfigError
-        The text is not TOML, or a path leads through what is no table.
+        The text is not TOML, or a path leads through what is not a table.
     """
     _short(text)
     if not changes:
@@ -275,7 +275,7 @@ GROUNDS = re.compile(r"# *(?:found|assumed|yours): ")
 BY_HAND = re.compile(
     r"# set by hand; was (?P<was>.+?)(?:, (?P<remark>(?:found|assumed|yours): .*))?$"
 )
-#: Part of a remark on a value that nothing but a person can state.
+#: Part of a remark on a value that only a person can state.
 OWN = "only you know"
 
 
@@ -309,7 +309,7 @@ def _set_by_hand(document: Any, place: str, value: Any, text: str) -> None:
 
 
 def _owner(document: Any, place: str) -> tuple[Any, str | int]:
-    """Return the table that holds the value of a place, and its key there.
+    """Return the table that holds the value of a path, and its key there.
 
     A number of a list has no remark of its own: then the list is meant.
     """
@@ -323,7 +323,7 @@ def _owner(document: Any, place: str) -> tuple[Any, str | int]:
 
 
 def _item(document: Any, place: str) -> Any:
-    """Return the value of a place with its remark; None: there is none, or it is a table."""
+    """Return the value of a path with its remark; None: there is none, or it is a table."""
     try:
         owner, key = _owner(document, place)
         found = owner.item(key) if hasattr(owner, "item") else owner[key]
@@ -333,7 +333,7 @@ def _item(document: Any, place: str) -> Any:
 
 
 def _plain(document: Any, place: str) -> Any:
-    """Return the value of a place, itself a number of a list, or None."""
+    """Return the value of a path, itself a number of a list, or None."""
     node = document
     try:
         for part in place.split("."):
@@ -437,7 +437,7 @@ def _path(folder: Path, name: str) -> Path:
 
 
 def refused_name(name: str) -> Finding | None:
-    """Return what is wrong with the name of a run; None: nothing, or it is not yet written."""
+    """Return what is wrong with the name of a run; None: it is valid, or not yet written."""
     try:
         plain_name(name or "run")
     except ConfigError as error:
@@ -515,7 +515,7 @@ def _remark(written: Sequence[str], line: int) -> str:
     beside = written[line - 1].rpartition("  # ")[2] if "  # " in written[line - 1] else ""
     above: list[str] = []
     for one in reversed(written[: line - 1]):
-        # What a value is known by begins a remark; without that a remark is of the line alone.
+        # The source of a value begins a remark; without that a remark is of the line alone.
         if beside or not one.startswith("# ") or (above and REMARK.match(above[0])):
             break
         above.insert(0, one)

@@ -1,4 +1,4 @@
-"""What the server tells the page by itself: jobs that changed, lines of live runs, new files."""
+"""Events that the server sends to the page: jobs that changed, lines of live runs, new files."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Events:
                 listening.cancel()
 
     async def watch(self) -> None:
-        """Look at jobs and folder, and tell what changed."""
+        """Look at jobs and folder, and report what changed."""
         before = await run_in_threadpool(self.folder.signature)
         count = 0
         while True:

@@ -2,7 +2,7 @@
 
 Every name that comes from outside is one plain component (`plain_name`), and every path is followed
 through its links before it is opened (`within`): nothing outside of the folder is read or written.
-What the studio keeps for itself is in `STATE`, which is never listed and never served.
+The studio's own files are in `STATE`, which is never listed and never served.
 """
 
 from __future__ import annotations
@@ -222,7 +222,7 @@ class Folder:
                 yield entry
 
     def files(self) -> list[dict[str, Any]]:
-        """List the files, and the folders that are no results: name, bytes, time of change in s.
+        """List the files, and the folders that are not results: name, bytes, time of change in s.
 
         A folder has ``inside``, the names of the recordings in it; what is none itself has a false
         ``recording``.
@@ -350,7 +350,7 @@ class Folder:
         return target
 
     def _check_room(self, plain: str, size: int, written: int = 0) -> None:
-        """Refuse a file that is too large, or for which there is no room: DataError."""
+        """Refuse a file that is too large, or for which room is missing: DataError."""
         if size > self.limits.upload:
             raise DataError("studio.upload-too-large", file=plain, most=self.limits.upload / 1e9)
         free = shutil.disk_usage(self.state).free

@@ -193,7 +193,7 @@ def _helps() -> dict[str, dict[str, str]]:
 
 
 def _help(path: tuple[str, ...]) -> str:
-    """What a field without a description of its own is: by its path, else by its name."""
+    """Description of a field without one of its own: by its path, else by its name."""
     by = _helps()
     whole = ".".join(path)
     named = (by["name"].get(".".join(path[-n:])) for n in (2, 1))

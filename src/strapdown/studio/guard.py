@@ -1,4 +1,4 @@
-"""What stands before every request of the studio: token, host, origin, sizes, waits and headers.
+"""Checks before every request of the studio: token, host, origin, sizes, waits and headers.
 
 The server has no accounts. Whoever knows the token in the address may use it; a page of another
 origin, a name that is made to point here (DNS rebinding), and a client that holds connections
@@ -26,7 +26,7 @@ Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
 App = Callable[[MutableMapping[str, Any], Receive, Send], Awaitable[None]]
 
-#: Of the page of the studio: what comes from it alone, and nothing written into the page.
+#: Of the page of the studio: only what comes from it, no script or style written into the page.
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; "
     "img-src 'self' data: blob:; font-src 'self'; connect-src 'self'; worker-src 'self'; "
@@ -46,7 +46,7 @@ HEADERS = {
     "permissions-policy": "camera=(), microphone=(), geolocation=(), usb=(), serial=()",
     "cache-control": "no-store",
 }
-#: Methods that change nothing.
+#: Methods that only read.
 _READING = ("GET", "HEAD")
 
 
@@ -123,7 +123,7 @@ class Guard:
         headers: dict[str, list[str]] = {}
         for name, value in scope["headers"]:
             headers.setdefault(name.decode("latin-1").lower(), []).append(value.decode("latin-1"))
-        # The host first: of a rebound name nothing is said of tokens.
+        # The host first: to a rebound name the answer does not mention tokens.
         hosts = headers.get("host", [])
         if len(hosts) != 1 or not self._host_allowed(hosts[0]):
             return 403, "studio.host-refused"

@@ -1,6 +1,6 @@
 """Runs the command of a job, keeps the last of what it prints, and writes how it ended.
 
-A program of its own, started by path with nothing but the standard library: it lives on when the
+A program of its own, started by path with only the standard library: it lives on when the
 server of the studio ends, and a server that is started again reads what it wrote.
 
 Arguments: file of the output, file of the end, and the words of the command.

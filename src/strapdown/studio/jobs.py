@@ -63,7 +63,7 @@ class Job:
         Instant at which the process began, as the system says it; of another process with the
         same number it is another.
     stopping : float or None, s
-        When it was told to end.
+        When it was asked to end.
     """
 
     id: str
@@ -157,7 +157,7 @@ class Jobs:
             return self.shown(number)
 
     def advance(self) -> list[dict[str, Any]]:
-        """See how the jobs stand, begin what waits; return those that changed."""
+        """See the state of the jobs, begin what waits; return those that changed."""
         changed = []
         with self._lock:
             for number, child in list(self._children.items()):
@@ -212,7 +212,7 @@ class Jobs:
         }
 
     def whole(self, number: str) -> list[str]:
-        """Lines of the output of a job: all of them, or the last of a very long one."""
+        """Lines of the output of a job: all, or the last of a very long one."""
         with self._lock:
             path = self.output(number)
         return _last(path, WHOLE).decode("utf-8", "replace").splitlines()
@@ -320,7 +320,7 @@ class Jobs:
         return text.splitlines()[-LINES:]
 
     def _end(self, job: Job) -> int | None:
-        """Return how the command ended; None if nothing says it."""
+        """Return how the command ended; None if that is not known."""
         with suppress(OSError, ValueError, KeyError, TypeError):
             return int(json.loads(self._file(job, "end").read_text(encoding="utf-8"))["code"])
         return None

@@ -1,4 +1,4 @@
-"""What a studio runs: the configuration of each kind, how it is proposed, and its command.
+"""Kinds of runs: the configuration of each, how it is proposed, and its command.
 
 ``navigate``, ``align`` and ``crash`` have configuration files of their own. The others take
 options; their file here has the same keys under ``[log]``, and becomes these options word by word.
@@ -53,7 +53,7 @@ __all__ = ["KINDS", "Draft", "Kind"]
 class Draft:
     """A proposed configuration: its text, what it rests on, and what is open.
 
-    `choose`: questions about the files, without whose answers there is no text. `offers`: tables
+    `choose`: questions about the files, without whose answers it has no text. `offers`: tables
     that a person may add; `again`: questions whose answers are proposed anew.
     """
 
@@ -114,7 +114,7 @@ def _axes_of(path: Path, keys: Keys, axes: str | None) -> str | None:
 
 @dataclass(frozen=True)
 class Roles:
-    """What each of several files is for.
+    """Role of each of several files.
 
     Attributes
     ----------
@@ -168,7 +168,7 @@ def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
     for one in found["streams"]:
         held[one["file"]][one["name"]] = {column["name"] for column in one["columns"]}
     asks = [(q["file"], q["key"]) for q in found["questions"] if not q.get("optional")]
-    # What is open about heights is open about fixes.
+    # An open question about heights is one about fixes.
     of_fixes = {file for file, key in asks if key == HEIGHTS}
     of_samples = {file for file, key in asks if key != HEIGHTS}
     inertial = [name for name in own if "imu" in held[name] or name in of_samples]
@@ -274,7 +274,7 @@ def _draft_crash(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
     unread: list[DataError] = []
     seen: set[Path] = set()
     for path in files_of_recorders(paths):
-        # A record of several files is one, whichever of them are chosen.
+        # A record of several files is one, whichever are chosen.
         if path.resolve() not in seen:
             try:
                 record = read_crash_record(path)

@@ -168,7 +168,7 @@ SHOWN = {
     "pitch": ("Pitch", "deg", "pitch_sd"),
     "heading": ("Heading", "deg", "heading_sd"),
 }
-#: Keys of a state line that are no quantities of the state.
+#: Keys of a state line that are not quantities of the state.
 STAMPS = ("time", "unix")
 
 

@@ -116,7 +116,7 @@ def look(
         if all((_cache(place) / s["key"] / s["name"] / LIST).is_file() for s in found["streams"]):
             os.utime(kept)
             return _with_unused(found, chosen)
-    # Names, not paths: nothing that is shown tells where the folder is, in which this process is.
+    # Names, not paths: the page does not show where the folder is, in which this process is.
     by_name = {place.name_of(path): path for path in paths}
     try:
         made = run_doctor(_examined(list(by_name), keys, axes))
@@ -182,7 +182,7 @@ MOST_UNUSED = 20
 def unused_files(paths: Sequence[Path], used: set[Path]) -> list[Finding]:
     """Return findings for files that are not among those used, by resolved path.
 
-    Those of folders, and those that are no recordings.
+    Those of folders, and those that are not recordings.
     """
     inside = [f for path in paths if path.is_dir() for f in sorted(path.iterdir()) if f.is_file()]
     inside += [path for path in paths if not is_recording(path)]
@@ -232,16 +232,16 @@ def _read_of(folder: Path, _: str) -> frozenset[Path]:
     return frozenset(file.resolve() for file in own)
 
 
-#: Why a folder is no recording: it has those of several sensors.
+#: Why a folder is not a recording: it has those of several sensors.
 SEVERAL = ("io.folder-of-recordings", "io.gyro-in-several-logs")
 
 
 def files_of_recorders(paths: Sequence[Path]) -> list[Path]:
     """Return paths with the tables of a folder in its place, where they are of several recorders.
 
-    A folder is one recorder, whose tables are joined, unless two of them have a gyro; in place of
+    A folder is one recorder, whose tables are joined, unless two have a gyro; in place of
     one with a single recording among other files are that recording, and its fixes and references.
-    Without what another path names as its own file, and what is no recording, unless it is all.
+    Without what another path names as its own file, and what is not a recording, unless it is all.
     """
     from strapdown.formats.crash_records import files_named
 
@@ -337,7 +337,7 @@ def _channels(folder: Path, path: Path) -> Iterator[tuple[str, dict[str, Any], d
     """Keep the channels of a record of a crash, those with the same stamps as one stream.
 
     Yields the name of the stream, its rate, and its list, whose columns have ``title`` and
-    ``label``, too: those of one quantity at one place share a title. Values are in SI where the
+    ``label``, too: those of one quantity at one position share a title. Values are in SI where the
     unit is known, else as recorded.
     """
     from strapdown.formats.crash_record import QUANTITIES
@@ -375,7 +375,7 @@ def _channels(folder: Path, path: Path) -> Iterator[tuple[str, dict[str, Any], d
 
 
 def _title(channel: Any) -> str:
-    """Quantity and place of a channel: what the channels of one sensor have in common."""
+    """Quantity and position of a channel: what the channels of one sensor have in common."""
     where = [channel.vehicle and f"vehicle {channel.vehicle}", channel.place]
     body = "" if channel.body == "vehicle" else channel.body
     if body and body.lower() not in channel.place.lower():

@@ -1,4 +1,4 @@
-"""Least and largest values of a long series over any buckets of time, without reading all of it.
+"""Least and largest values of a long series over any buckets of time, without reading it whole.
 
 A pyramid has the least and the largest value of each block of `FACTOR` samples, of each block of
 so many blocks, and so on. A bucket is then at most `FACTOR` - 1 samples at each of its ends, so
@@ -168,7 +168,7 @@ class StoredStream:
         -------
         dict
             ``t``: middle of each bucket, s, or the stamps; ``columns``: unit, ``low`` and ``high``
-            of each, None where there is no value.
+            of each, None where a value is missing.
         """
         listed = json.loads((self.folder / LIST).read_text(encoding="utf-8"))
         time = self._array("time")

@@ -1,4 +1,4 @@
-"""What a log leaves open, as questions with answers to choose from.
+"""Open points of a log, as questions with answers to choose from.
 
 An answer sets keys of the table ``[log]``, or ``axes``; what the file itself suggests comes first.
 """
@@ -139,7 +139,7 @@ def of_each(keys: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
 def of_file(
     keys: Mapping[str, Any], axes: str | None, name: str
 ) -> tuple[dict[str, Any], str | None]:
-    """Return the keys and the axes of one file: what is stated of all files, and of it alone."""
+    """Return the keys and the axes of one file: as stated of all files, and of this one."""
     own = dict(keys.get(OF_FILES, {}).get(name, {}))
     own_axes = own.pop("axes", None)
     common = {key: value for key, value in keys.items() if key != OF_FILES}
@@ -156,7 +156,7 @@ def role_question(role: str, names: Sequence[str], *, none: str = "") -> dict[st
     names : sequence of str
         Of the files that could have it.
     none : str
-        Label of the answer that none of them has it; without it there is no such answer.
+        Label of the answer that none has it; without it there is no such answer.
     """
     finding = Finding(f"studio.which-{role}", severity="error", data={"names": list(names)})
     key = ROLES[role]

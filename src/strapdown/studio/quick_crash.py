@@ -1,7 +1,7 @@
-"""A crash while its parameters move: one recorder, linear bounds, nothing drawn or written.
+"""A crash while its parameters move: one recorder, linear bounds, without drawings or files.
 
 The whole answer of `strapdown crash` has all recorders against each other, drawn paths and
-severity, and takes seconds; this part of it takes a fraction of one. Its records are kept between
+severity, and takes seconds; this part takes a fraction of one. Its records are kept between
 two questions.
 """
 

@@ -53,7 +53,7 @@ QUESTIONS = {
 
 
 class Refused(Exception):  # noqa: N818
-    """What the process answers where a question has no other answer.
+    """Answer of the process where a question has no other.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ def told(finding: Finding) -> dict[str, Any]:
 def main() -> None:
     """Answer questions on the standard streams until the input ends."""
     answers = os.fdopen(os.dup(1), "wb")
-    # What a library prints must not be among the answers.
+    # The output that a library prints must not be among the answers.
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     asked = os.fdopen(os.dup(0), "rb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)

@@ -1,8 +1,8 @@
 """Results in the studio: what a sealed folder holds, as numbers, series, track and downloads.
 
 A result may come from anyone: its manifest and its files are data, which are read in the process
-for reading and checked before they are shown. Only files that the manifest lists, and those that
-stand beside the seal, are given away.
+for reading and checked before they are shown. Only files that the manifest lists, and those beside
+the seal, are given away.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def _verdict(place: Path, manifest: Mapping[str, Any]) -> str | None:
 
 
 def file_of_run(folder: Path, name: str, path: str) -> Path:
-    """Return a file of a result that its manifest lists, or that stands beside the seal.
+    """Return a file of a result that its manifest lists, or that is beside the seal.
 
     ConfigError: there is none, or the path leads elsewhere.
     """
@@ -155,7 +155,7 @@ def run(folder: Path, name: str) -> dict[str, Any]:
     against = [_finding(one) for one in _list(answer.get("trust"), "against")[:MOST]]
     noticed = [_finding(one) for one in _list(answer, "findings")[:MOST]]
     if manifest["command"] == "attitude":
-        # What is of no file is of one of several algorithms, which the report names, too.
+        # A finding without a file is of one of several algorithms, which the report names, too.
         for one in noticed:
             if one["quantity"] and not one["file"]:
                 one["text"] = f"{one['quantity']}: {one['text']}"
@@ -272,7 +272,7 @@ def _premises(answer: Mapping[str, Any]) -> list[str]:
     from strapdown.report.attitude_words import premises
 
     found = [one for one in _list(answer.get("answer"), "why") if isinstance(one, str)]
-    # What another program wrote may have another form: it is then not told.
+    # What another program wrote may have another form: it is then omitted.
     with suppress(KeyError, TypeError, ValueError):
         said = premises(answer["initial"], answer["gyro_bias"])
         found = [*(f"{name}: {text}" for name, text in said), *found]
@@ -285,7 +285,7 @@ def _heading(sealed: SealedRun) -> str | None:
 
     if sealed.command != "navigate":
         return None
-    # What another program wrote may have another form: it is then not told.
+    # What another program wrote may have another form: it is then omitted.
     with suppress(StrapdownError, KeyError, IndexError, TypeError, ValueError, AttributeError):
         told = sealed.parts[0].json("verdict.json")["heading"]
         shares = {status: float(told["share"][status]) for status in STATUSES}
@@ -453,7 +453,7 @@ def _known_attitude(place: Path, manifest: Mapping[str, Any], time: Array) -> di
     from strapdown.tables import EULER, QUATERNION
 
     stated = {k: v for k, v in manifest["configuration"].items() if k != "report"}
-    # What a manifest names elsewhere is not read.
+    # A file that a manifest names elsewhere is not read.
     if any(not (place / p).resolve().is_relative_to(place.resolve()) for p in named_paths(stated)):
         return {}
     with suppress(StrapdownError, OSError, ValueError):
@@ -492,7 +492,7 @@ def _read(path: Path) -> pd.DataFrame:
 
 
 def track(folder: Path, name: str, points: int) -> dict[str, Any]:
-    """Return places and attitudes along a navigation, at most so many, the ends among them."""
+    """Return positions and attitudes along a navigation, at most so many, the ends among them."""
     place, manifest = _opened(folder, name)
     table = _read(file_in(place, "trajectory.csv", manifest))
     if not {"lat_deg", "lon_deg", "alt_m"} <= set(table.columns):
@@ -525,7 +525,7 @@ def _input(place: Path, path: str, manifest: Mapping[str, Any]) -> Path:
     beneath = ".." not in Path(path).parts and found.resolve().is_relative_to(own)
     if path in copied or not beneath or not found.is_dir():
         return file_in(place, path, manifest)
-    # A reader takes whatever lies in a folder: nothing may that is not listed, or is elsewhere.
+    # A reader takes whatever lies in a folder: each file must be listed, and in the folder.
     inside = [one for one in found.rglob("*") if not one.is_dir() or one.is_symlink()]
     names = {one: one.relative_to(place).as_posix() for one in inside}
     if not inside or not copied.issuperset(names.values()):
@@ -536,7 +536,7 @@ def _input(place: Path, path: str, manifest: Mapping[str, Any]) -> Path:
 
 
 def _fixes(place: Path, manifest: Mapping[str, Any], points: int) -> dict[str, Any] | None:
-    """Return the fixes that the run used, if it has a copy of them."""
+    """Return the fixes that the run used, if it has a copy."""
     from strapdown.config.logs import FixesTable
     from strapdown.config.spec import specify
     from strapdown.formats.gnss_files import read_gnss
@@ -554,7 +554,7 @@ def _fixes(place: Path, manifest: Mapping[str, Any], points: int) -> dict[str, A
 
 
 def _reference(place: Path, manifest: Mapping[str, Any], points: int) -> dict[str, Any] | None:
-    """Return the reference trajectory of the run, if it has a copy of it."""
+    """Return the reference trajectory of the run, if it has a copy."""
     from strapdown.formats.trajectory_readers import read_trajectory
 
     truth = manifest["configuration"].get("navigation", {}).get("truth")
@@ -627,7 +627,7 @@ def export(
 
 
 def _zip(place: Path, name: str, manifest: Mapping[str, Any], out: Path) -> None:
-    """Write the files of a result, and nothing else that lies in its folder."""
+    """Write the files of a result, and no other that lies in its folder."""
     names = [MANIFEST, *UNSEALED]
     names += [p.name for p in place.iterdir() if SIGNATURE_FILE.fullmatch(p.name)]
     names += [str(one["name"]) for one in manifest["outputs"]]

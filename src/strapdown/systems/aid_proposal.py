@@ -40,7 +40,7 @@ LEAST = 10
 #: Error of a height by gusts, doors and fans, m, and that by the wind of travel as a share of the
 #: dynamic pressure: an opening that is not flush has a tenth (`Barometer`). How long both last, s.
 GUSTS, OF_DYNAMIC, WEATHER = 0.5, 0.1, 30.0
-#: Time over which heights are averaged, s: faster they tell no more, and cost updates.
+#: Time over which heights are averaged, s: faster they show no more, and cost updates.
 MEAN = 1.0
 #: Error of a wheel's speed by slip, a bus that is late, and a lever arm that nobody stated, m/s,
 #: and how long it lasts, s.
@@ -68,7 +68,7 @@ class Magnetic:
         Of the model; `THIS_YEAR` if the recording has no date.
     dated : bool
     heading_deg : float
-        Of the body at the start, true, as if there were no hard iron.
+        Of the body at the start, true, as if without hard iron.
     spread_deg : float
         Standard deviation of the headings of the parts of the start, deg: of a body that turns or
         accelerates there.
@@ -95,8 +95,8 @@ class Magnetic:
         """Standard deviation of the heading, deg.
 
         Strength and dip show two components of an error of the field; the third, across it, is
-        taken to be as large, and turns the heading by itself over the horizontal field. What the
-        heading does over the start is added.
+        taken to be as large, and turns the heading by itself over the horizontal field. The motion
+        of the heading over the start is added.
         """
         (size, dip), (expected, steep) = self.measured, self.expected
         seen = math.hypot(size / expected - 1.0, math.radians(dip - steep)) / math.sqrt(2.0)
@@ -177,14 +177,14 @@ def propose_magnetometer(
     fixes: pd.DataFrame | None,
     place: tuple[float, float, float] | None,
 ) -> Magnetic | None:
-    """Propose the magnetometer of a recording, at a place; None without one of them.
+    """Propose the magnetometer of a recording, at a position; None without either.
 
     Parameters
     ----------
     imu : DataFrame
         Imu table of the log, with the columns of a field or without.
     fixes : DataFrame, optional
-        They may have the date, and the place.
+        They may have the date, and the position.
     place : tuple of float, optional
         Latitude and longitude in deg, height in m.
     """

@@ -225,7 +225,7 @@ class AllanRun(SavedRun):
 
 @one_thread()
 def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
-    """Find the noise of a sensor from a log at rest, or from several of them together.
+    """Find the noise of a sensor from a log at rest, or from several together.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ Array = NDArray[np.float64]
 DEG = math.pi / 180.0
 #: Poses that differ by more count as two, rad; a face is up within this, rad.
 POSE_APART, FACE_WITHIN = 15.0 * DEG, 20.0 * DEG
-#: Distinct poses from which all errors of the accelerometers can be told apart.
+#: Distinct poses from which all errors of the accelerometers are observable.
 ENOUGH = 9
 #: Readings of the field in a rest, and what iron may leave of its direction, deg, for its axes.
 LEAST_OF_REST, IRON_KNOWN = 5, 1.0
@@ -301,7 +301,7 @@ def _procedure(
     records: Sequence[CalibrationRecord],
     magnetometer: MagnetometerCalibration | None,
 ) -> str:
-    """What the logs show, if it is not stated."""
+    """Procedure that the logs show, if it is not stated."""
     if spec.procedure is not None:
         if spec.procedure in ("turns", "rate-table") and not spec.turns:
             raise ConfigError("calibrate.no-turns", quantity="turns", procedure=spec.procedure)

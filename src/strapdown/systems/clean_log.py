@@ -62,7 +62,7 @@ def write_clean_log(found: Diagnosis, out: str | Path, *, force: bool = False) -
         There are several logs, a file exists, or the suffix is unknown.
     DataError
         The log leaves something open other than rows to drop; its axes are not stated, and gravity
-        contradicts or does not determine that z points down; or it has nothing to write.
+        contradicts or does not determine that z points down; or it has no samples to write.
     """
     out = Path(out)
     # Fixes in a file of their own are written beside the samples.

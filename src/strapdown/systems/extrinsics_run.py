@@ -212,7 +212,7 @@ def read_field(path: str | Path) -> pd.DataFrame:
 
 
 def _open(result: Extrinsics, name: str) -> tuple[Finding, ...]:
-    """What the motion leaves open, with the remedy."""
+    """Quantities that the motion leaves open, with the remedy."""
     found = []
     for group, axes in result.hidden.items():
         for axis in axes:
@@ -227,7 +227,7 @@ def _open(result: Extrinsics, name: str) -> tuple[Finding, ...]:
 # The antenna of a satellite receiver: states of a smoothed run.
 
 #: Standard deviations of the state with which a pass begins: position, m, velocity, m/s, tilt and
-#: heading, deg. All that is known of it comes from the fixes, once.
+#: heading, deg. All knowledge of the state comes from the fixes, once.
 UNKNOWN_PLACE, UNKNOWN_TILT, UNKNOWN_HEADING = 100.0, 10.0, 60.0
 #: Most passes, and the movement of arm and offset by the last one, in standard deviations.
 PASSES, SETTLED = 12, 0.05

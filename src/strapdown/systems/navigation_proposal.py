@@ -101,7 +101,7 @@ NOISE_OF_GRADES = (
 SCALES = {"correlation_time_s": 3600.0}
 #: Change of the biases of a grade while the unit warms up: gyros, deg/h, and accelerometers, µg.
 #: Data sheets state 0.005 to 0.05 deg/s/K and 0.1 to 1 mg/K for consumer parts (ICM-42688-P,
-#: LSM6DSO, BMI160), a third of it for industrial ones; assumed: a unit becomes 3 to 5 K warmer.
+#: LSM6DSO, BMI160), a third for industrial ones; assumed: a unit becomes 3 to 5 K warmer.
 #: And the time in which most of that happens, s.
 WARMING = {"phone": (180.0, 1000.0), "industrial": (54.0, 400.0)}
 WARM = 400.0
@@ -421,7 +421,7 @@ def _sensors(
 
 
 def _warming(named: str) -> dict[str, Any]:
-    """Change of the biases of a sensor whose grade warms up: nothing says that the unit is warm."""
+    """Change of the biases of a sensor whose grade warms up: the unit may not be warm yet."""
     if (sds := WARMING.get(load_sensor(named).grade)) is None:
         return {}
     return {"warming": {"gyro_sd_deg_per_h": sds[0], "accel_sd_ug": sds[1], "time_s": WARM}}

@@ -376,7 +376,7 @@ def _with_known_offsets(
     that begins with an uncertain one is as uncertain in position up to its first manoeuvre. It is
     repeated with the last estimate, of standard deviation s, as if it were known to `ASSUMED` = k
     times s (and to its random walk since the start). Its data are then used twice: with information
-    1/s² + 1/(k s)² in place of 1/s², so that no variance is understated by more than
+    1/s² + 1/(k s)² instead of 1/s², so that no variance is understated by more than
     1 + 1/k² (5 % of a standard deviation). Offsets that were not constant are left as they are.
     """
     aids: list[Measurement] = []

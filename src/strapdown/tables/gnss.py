@@ -150,7 +150,7 @@ def usable(table: pd.DataFrame, columns: Sequence[str]) -> NDArray[np.bool_]:
 
 
 class Fit(NamedTuple):
-    """The reading of velocities that agrees with the positions; empty if none of them does.
+    """The reading of velocities that agrees with the positions; empty if none does.
 
     `row`: of the first step that shows it. `speed`, `moved` (m/s): by the table and its positions.
     """
@@ -175,7 +175,7 @@ def fitting(
     sd : ndarray, (n,), m
         Standard deviation of each position.
     readings : mapping of str to (ndarray, ndarray)
-        By name: velocity north and east, (n, 2), m/s, or down, (n, 1); and the geodetic places,
+        By name: velocity north and east, (n, 2), m/s, or down, (n, 1); and the geodetic positions,
         (n, 3), deg, deg, m. The first is that of the table.
     limits : (3,)
         Relative misfit beyond which the table's own reading is not right, and below which another
@@ -184,7 +184,7 @@ def fitting(
     Returns
     -------
     Fit or None
-        None if the positions do not move enough to tell. Another reading has to agree where the
+        None if the positions do not move enough to decide. Another reading has to agree where the
         table's own does not, in steps longer than `CLEAR` standard deviations.
     """
     unlike, alike, slowest = limits
@@ -290,7 +290,7 @@ def check_velocity(table: pd.DataFrame) -> Fit | None:
 
 
 def _readings(velocity: Array, place: Array) -> dict[str, tuple[Array, Array]]:
-    """Return readings of velocities, (n, 2), and places, (n, 3), by the code that says them."""
+    """Return readings of velocities, (n, 2), and positions, (n, 3), by the code of each."""
     readings = {"told": (velocity, place)}
     readings |= {unit: (velocity * SPEEDS[unit], place) for unit in SPEEDS_OF_OTHERS}
     readings |= {",".join(pair): (other, place) for pair, other in turned(velocity).items()}

@@ -34,7 +34,7 @@ def room(
     large: int | None = None,
     most: float = math.inf,
 ) -> NDArray[Any]:
-    """Return an array to be filled; in memory if it is small, or if the disk has no place for it.
+    """Return an array to be filled; in memory if it is small, or if the disk has no room for it.
 
     The file is in the folder for temporary files, without a name, and gone with the array. A
     process that forks shares it with its child. In memory on macOS and Windows.
@@ -50,7 +50,7 @@ def room(
     ):
         try:
             with tempfile.TemporaryFile() as file:
-                # A page that the disk has no place for would end the process by a signal.
+                # A page that the disk has no room for would end the process by a signal.
                 os.posix_fallocate(file.fileno(), 0, size)
                 mapped = mmap.mmap(file.fileno(), size)
             _MAPS.add(mapped)

@@ -398,7 +398,7 @@ def _stamped(stamps: Array, number: Numbers, step: float) -> NDArray[np.bool_]:
 def _smoother_on(fitted: Array, stamps: Array, values: Array | None, begins: Numbers) -> float:
     """Return by how many standard deviations values are smoother on fitted instants than on stamps.
 
-    A sample is predicted from its neighbors, on either time base; zero where nothing moves.
+    A sample is predicted from its neighbors, on either time base; zero without motion.
     """
     if values is None or stamps.size < 2 * BLOCKS:
         return 0.0

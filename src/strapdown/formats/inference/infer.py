@@ -111,7 +111,7 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
         best = next(iter(times))
         known = steps.mean * factor_of(best, TIME_UNITS)
         step = known if known > 0 and times[best] > 0.9 else None
-    # All stamps tell of the clock; of the rest a part is enough.
+    # All stamps show the clock; of the rest a part is enough.
     signals, starts = _part(signals, step)
     force = None
     accel = _finite(signals.accel)

@@ -256,7 +256,7 @@ def _in_steps(gyro: Array, scale: float, written: tuple[float, float]) -> tuple[
             if spread < _LEAST_SPREAD:
                 continue
             k = axis[np.abs(axis) < _WITHIN * step] / step
-            # Some of them show that most steps are none.
+            # Some show that most steps are none.
             some = _phase(k[:: 1 + k.size // _OF_SOME])
             phase = _phase(k) if abs(some) > _SOME_IN_STEP else some
             if abs(phase) <= _IN_STEP:
@@ -395,7 +395,7 @@ class Turn:
     `half_width` (s). `windows`: number of windows without overlap. `gram` ((10, 10)): for the nine
     elements of k M (row by row) and the change of gravity, with the bias eliminated; gravity has
     norm 1. `still_rates`, `still_force` ((m, 3)): integral of the gyro over each window in which
-    gravity stands still, weighted, in its unit times s, and the direction of the force there; empty
+    gravity is constant, weighted, in its unit times s, and the direction of the force there; empty
     if these are few.
     """
 
@@ -534,7 +534,7 @@ def scale_by_gravity(found: Sequence[Turn]) -> Scale | None:
         return None
     weights = 1.0 / np.maximum(sds, 1e-6 * factors) ** 2
     mean = float(weights @ factors / weights.sum())
-    # The windows of all time scales are of one motion: the least deviation of one of them.
+    # The windows of all time scales are of one motion: the least deviation of any.
     sd = float(np.sqrt(sds.min() ** 2 + np.var(factors) + (_SCALE_SD * mean) ** 2))
     explained = min(one for *_, one in rows)
     return Scale(mean, mean - 1.96 * sd, mean + 1.96 * sd, names[rows[0][0]], explained)
