@@ -29,7 +29,9 @@ from strapdown.units import TIME_UNITS
 _TRIADS = {"gyro": "gyro", "accel": "accel", "mag": "mag", "magnetometer": "mag"}
 #: Words of a table that has no gravity, or that its device did not correct.
 _NOT_A_TRIAD = {*WITHOUT_GRAVITY, "gravity", "uncalibrated"}
-_AXIS = re.compile(r"([xyz])(?:[\s_-]*axis)?(?:\s*[\[(].*)?", re.I)
+_AXIS = re.compile(
+    r"(?:value[\s_-]*)?([xyz])(?:[\s_-]*(?:axis|values?|data))?(?:\s*[\[(].*)?", re.I
+)
 
 
 def _is_of_one_recording(archive: Path) -> bool:

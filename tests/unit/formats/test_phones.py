@@ -422,6 +422,12 @@ def test_a_table_that_only_has_the_name_of_a_sensor_in_its_own_is_none_of_it(tmp
     assert reader_of(in_folder(tmp_path / "a", {"my_gyroscope_1.csv": text})) == "sensor-folder"
     other = in_folder(tmp_path / "b", {"my_gyroscope_1.csv": of_names})
     assert not READERS["sensor-folder"].detect(other)
+    for names in ("{}_value", "value {}", "{}"):
+        of_axes = text
+        for axis in "xyz":
+            of_axes = of_axes.replace(f"{axis}-axis (deg/s)", names.format(axis.upper()))
+        named = in_folder(tmp_path / names.replace("{}", "c"), {"kinetics_gyro.csv": of_axes})
+        assert reader_of(named) == "sensor-folder"
 
 
 # --- archives ---------------------------------------------------------------------------
