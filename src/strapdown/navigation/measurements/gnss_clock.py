@@ -24,6 +24,7 @@ __all__ = [
     "check_overlap",
     "find_time_offset",
     "find_velocity_delay",
+    "sure_delay",
     "time_offset",
     "velocity_delay",
 ]
@@ -67,15 +68,15 @@ class TimeOffset:
     Attributes
     ----------
     offset, sd : float, s
-    share : float
-        Of the changes of that course or speed that the sensors explain.
-    by : {'course', 'speed'}
+    share : float or None
+        Of the changes of that course or speed that the sensors explain; None of windows alone.
+    by : {'course', 'speed', 'windows'}
         Main source of the estimate.
     """
 
     offset: float
     sd: float
-    share: float
+    share: float | None
     by: str
 
 
@@ -202,17 +203,15 @@ def time_offset(
 
 
 def find_time_offset(
-    gnss: pd.DataFrame,
-    imu: pd.DataFrame,
-    assumed: float = 0.0,
-    velocity_delay: float = 0.0,
-    assumed_sd: float = 0.0,
+    gnss: pd.DataFrame, found: TimeOffset | None, assumed: float = 0.0, assumed_sd: float = 0.0
 ) -> list[Finding]:
     """Report an offset that is significant, and beyond the assumed one.
 
     Parameters
     ----------
-    assumed, velocity_delay, assumed_sd : float, s
+    found : TimeOffset or None
+        Of these fixes, as of `time_offset`.
+    assumed, assumed_sd : float, s
         As configured; an offset within three standard deviations is left to the filter.
 
     Returns
@@ -220,7 +219,6 @@ def find_time_offset(
     list of Finding
         With the option that removes it; empty without a significant offset.
     """
-    found = time_offset(gnss, imu, velocity_delay)
     if found is None or abs(found.offset - assumed) < max(
         SURE * found.sd, LEAST_OFFSET, 3.0 * assumed_sd
     ):
@@ -530,6 +528,12 @@ def velocity_delay(table: pd.DataFrame) -> VelocityDelay | None:
     return VelocityDelay(
         delay, float(np.sqrt(max(variance, least))) / power, changing, int(near.sum())
     )
+
+
+def sure_delay(table: pd.DataFrame) -> float:
+    """Return the delay of the velocity, s, as far as it is significant, and zero otherwise."""
+    found = velocity_delay(table)
+    return 0.0 if found is None or found.delay < GNSS_DELAY_SURE * found.sd else found.delay
 
 
 def find_velocity_delay(table: pd.DataFrame, assumed: float = 0.0) -> list[Finding]:

@@ -109,13 +109,13 @@ def test_the_offset_of_the_clocks_is_found_to_a_tenth_of_a_second(offset):
     found = time_offset(table, imu())
     assert found.offset == pytest.approx(offset, abs=0.05)
     assert found.offset == pytest.approx(offset, abs=3.0 * found.sd)
-    (told,) = find_time_offset(table, imu())
+    (told,) = find_time_offset(table, found)
     assert "time_offset_s" in told.remedy
     leap = told.code == "navigation.receiver-clock-off-leap-seconds"
     assert leap == (offset == 18.0)
     # What the filter is to find is not told again.
-    assert not find_time_offset(table, imu(), found.offset)
-    assert not find_time_offset(table, imu(), 0.0, 0.0, assumed_sd=abs(offset))
+    assert not find_time_offset(table, found, found.offset)
+    assert not find_time_offset(table, found, 0.0, assumed_sd=abs(offset))
 
 
 @pytest.mark.parametrize("decimals", [16, 12, 9])
