@@ -647,7 +647,9 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
 
     The share by the scatter from fix to fix, which lacks what lasts; where the velocities show
     what lasts, by its size, which a receiver may understate. One that understates its scatter
-    says nothing of what lasts, either: nor does a scatter that motion or velocities may hide.
+    says nothing of what lasts, either: nor does a scatter that motion or velocities may hide. Of
+    most code receivers nearly all lasts; one that scatters by more of what it states may understate
+    it.
     Float solutions have errors of their own.
     """
     assumed = "position_sd_taken" in fixes.attrs
@@ -662,8 +664,9 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
     stated = float(np.nanmedian(values_of(fixes, POSITION_SD)[:, :2]))
     precise = white < PHASE if assumed else stated < SHOWS_ARM
     by_velocity = None if precise else lasting_position_sd(fixes, delay)
+    measured = bool(np.isfinite(values_of(fixes, VELOCITY_SD[:2])).any())
     usual = LASTS_BY_PHASE if white < PHASE else LASTS_BY_CODE
-    least, lasting, total = LASTS, 1.0 - part**2, 1.0
+    least, lasting, total, certain = LASTS, 1.0 - part**2, 1.0, UNDERSTATED
     if by_velocity is not None:
         least, quiet, slow = SHOWN, *(x**2 for x in by_velocity)
         if _velocities_as_taken(fixes) and quiet + slow < MISSTATED**2:
@@ -671,6 +674,14 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
         lasting = 1.0 - quiet / total
     elif not assumed and UNDERSTATED < part < MISSTATED and _shows_scatter(fixes, white):
         total, lasting = part**2 / (1.0 - usual), usual
+    elif not (assumed or precise or measured) and part < MISSTATED:
+        # Where the scatter is more than usual, less lasts, or the receiver understates all of it,
+        # or the vehicle's motion is in it: nothing says which, and of the excess, in its logarithm,
+        # each has an equal part.
+        shows = _shows_scatter(fixes, white)
+        excess = max(1.0, part / math.sqrt(1.0 - usual))
+        total, certain = (excess if shows else excess ** (2.0 / 3.0)), 1.0
+        lasting = 1.0 - part**2 / total if shows else usual
     elif not assumed and precise:
         # The scatter is an upper bound of what is white.
         unsure = SHARE_SD * math.sqrt(SCATTER / len(fixes))
@@ -682,7 +693,7 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
         lasting = usual if by_velocity is None else max(lasting, usual)
     lasting = min(lasting, LASTS_MOST)
     out = {"position_correlated_share": round(lasting, 2)} if lasting >= least else {}
-    if math.sqrt(total) >= UNDERSTATED:
+    if total > 1.0 and math.sqrt(total) >= certain:
         out["position_sd_factor"] = round(math.sqrt(total), 2)
     if precise:
         out["lever_arm_sd_m"] = ARM_SD
