@@ -674,14 +674,12 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
         lasting = 1.0 - quiet / total
     elif not assumed and UNDERSTATED < part < MISSTATED and _shows_scatter(fixes, white):
         total, lasting = part**2 / (1.0 - usual), usual
-    elif not (assumed or precise or measured) and part < MISSTATED:
-        # Where the scatter is more than usual, less lasts, or the receiver understates all of it,
-        # or the vehicle's motion is in it: nothing says which, and of the excess, in its logarithm,
-        # each has an equal part.
-        shows = _shows_scatter(fixes, white)
-        excess = max(1.0, part / math.sqrt(1.0 - usual))
-        total, certain = (excess if shows else excess ** (2.0 / 3.0)), 1.0
-        lasting = 1.0 - part**2 / total if shows else usual
+    elif not (assumed or precise or measured) and _shows_scatter(fixes, white):
+        if part < MISSTATED:
+            # Where the scatter is more than usual, less lasts, or the receiver understates all of
+            # it: nothing says which, and half of the excess is, in its logarithm, of each.
+            total, certain = max(1.0, part / math.sqrt(1.0 - usual)), 1.0
+            lasting = 1.0 - part**2 / total
     elif not assumed and precise:
         # The scatter is an upper bound of what is white.
         unsure = SHARE_SD * math.sqrt(SCATTER / len(fixes))

@@ -41,8 +41,10 @@ UNIX = (7.9e8, 2.21e9)
 LARGEST, STEP, FINE_STEP = 20.0, 0.1, 0.025
 #: Steps about the result: whose misfits count, and to which a parabola is fitted.
 AROUND, FITTED = 20, 4
-#: Below this speed, m/s, a course is not usable.
-LEAST_SPEED = 3.0
+#: Below this speed, m/s, a course is not usable; of velocities that are measured, below so many of
+#: their standard deviations and the speed of a slow walk. An offset less certain than this, s, is
+#: not known.
+LEAST_SPEED, PRECISE, SLOW_WALK, UNCLEAR = 3.0, 10.0, 0.7, 0.5
 #: Lever arm of an antenna from the unsteered axle, m, one standard deviation of an element; the
 #: time over which a rate at an instant is taken, s; and the standard deviation of a result from
 #: steps whose residuals are correlated over that from independent ones.
@@ -178,11 +180,15 @@ def time_offset(
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
     course = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
     steps = np.diff(at)
-    ready = (steps <= LONGEST_STEP) & (np.minimum(speed[1:], speed[:-1]) > LEAST_SPEED)
+    least = LEAST_SPEED
+    if (measured := usable(gnss, VELOCITY_SD[:2])).any():
+        sd = float(np.median(values_of(gnss, VELOCITY_SD[:2])[measured]))
+        least = min(LEAST_SPEED, max(SLOW_WALK, PRECISE * sd))
+    ready = (steps <= LONGEST_STEP) & (np.minimum(speed[1:], speed[:-1]) > least)
     turns = np.abs(np.diff(course)) < 0.5 * math.pi
     if not ready.any():
         return None
-    slow = np.maximum(speed, LEAST_SPEED)
+    slow = np.maximum(speed, least)
     found = [
         one
         for name, change, columns, used, per_rate in (
@@ -196,7 +202,7 @@ def time_offset(
     weights = np.array([one.sd**-2 for one in found])
     offsets = np.array([one.offset for one in found])
     offset, sd = float(weights @ offsets / weights.sum()), float(weights.sum() ** -0.5)
-    if np.ptp(offsets) > 4.0 * math.hypot(*(one.sd for one in found)):
+    if np.ptp(offsets) > 4.0 * math.hypot(*(one.sd for one in found)) or sd > UNCLEAR:
         return None
     best = found[int(np.argmax(weights))]
     return TimeOffset(offset, sd, best.share, best.by)
