@@ -424,6 +424,9 @@ class NavigatorState:
 #: Averaging time that removes vibration from rates and forces, s: receivers do not see it beyond a
 #: tenth of a second, and a vehicle hardly changes its acceleration in that time.
 STEADY_TIME = 0.2
+#: Time over which corrections of the velocity fade in `View.corrected`, s: long against that for
+#: which a filter follows single fixes, short against that in which a tilt changes the velocity.
+CORRECTED_TIME, CORRECTED = 3.0, "corrected"
 #: A mark older than this is followed by another before an observation, so much earlier, s: what
 #: lies between two marks would not show how far the standard deviation had grown.
 AGED = 0.15
@@ -724,6 +727,18 @@ class EpochLoop:
             return np.asarray(self.steadies[k - 1])
         return self.begun_steady[:6] if self.begun_steady[6] else None
 
+    def _velocity(self, at: float) -> Array:
+        """Velocity of the mechanization, north-east-down, m/s."""
+        mechanization = self.navigator.filter.mechanization
+        return np.asarray(mechanization.nav_state(self.engine.mechanization, at).v_n)
+
+    def _lately_corrected(self, at: float) -> Array:
+        """Return `View.corrected` at an instant."""
+        if CORRECTED not in self.kept:
+            return np.zeros(3)
+        *moved, when = self.kept[CORRECTED]
+        return np.array(moved) * math.exp((when - at) / CORRECTED_TIME)
+
     def _propagate(self, time: Array, rows: Array, history: Array) -> None:
         """Propagate over steps without epochs, and mark the covariance in time."""
         made = 0
@@ -752,6 +767,7 @@ class EpochLoop:
             covariance_of=partial(filter_.physical_covariance, engine.filter),
             steady=self._steady(at),
             unobserved=at - self.observed,
+            corrected=self._lately_corrected(at),
             kept=self.kept,
         )
         told: list[tuple[Measurement, Observation]] = []
@@ -769,6 +785,9 @@ class EpochLoop:
             known = [self.engine.known(one) for one in observations]
             rules = [aid.rule or filter_.rule for aid, _ in told]
             innovations = self._told(rules, observations, view)
+            if view.steady is not None:
+                moved = self._velocity(at) - view.here.v_n
+                self.kept[CORRECTED] = np.append(view.corrected + moved, at)
             for one, nu in zip(known, innovations, strict=True):
                 row = Innovations(nu.nu[None], nu.s[None], nu.weight[None])
                 columns = InnovationColumns(one.name, one.labels, np.array([at]), row, one)

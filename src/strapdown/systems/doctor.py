@@ -46,8 +46,8 @@ from strapdown.formats.recording import ABSENT, PLACEHOLDERS, RawLog, Recording
 from strapdown.formats.references import read_truth
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.frames import ways_between
-from strapdown.navigation.measurements.gnss_clock import time_offset
-from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
+from strapdown.navigation.measurements.gnss_clock import TimeOffset
+from strapdown.navigation.measurements.gnss_readiness import gnss_readiness, without_repeats
 from strapdown.progress import Progress, silent
 from strapdown.sensors.health_log import LEAST_SAMPLES
 from strapdown.sensors.imu_health import ImuHealth, check_imu_channels
@@ -66,6 +66,7 @@ from strapdown.systems.navigation_checks import MOST, longest_faults, unusable_s
 from strapdown.systems.navigation_proposal import (
     CODE_POSITION_SD,
     CODE_VELOCITY_SD,
+    clock_offset,
     first_motion,
 )
 from strapdown.systems.one_thread import one_thread
@@ -578,7 +579,7 @@ def _unmoved(
 
 def _fixes_against(
     streams: Mapping[str, pd.DataFrame], log: LogTable
-) -> tuple[dict[str, float] | None, list[Finding]]:
+) -> tuple[dict[str, float | None] | None, list[Finding]]:
     """Check fixes by themselves and against the samples; return the offset of the clocks, too.
 
     `log`: which part of the samples was asked for.
@@ -587,13 +588,23 @@ def _fixes_against(
     if gnss is None:
         return None, []
     found: list[Finding] = []
-    try:
-        if imu is None:
+    if imu is None:
+        try:
             return None, list(gnss_readiness(gnss))
+        except DataError as error:
+            return None, [error.finding]
+    offset: TimeOffset | None = None
+
+    def search(delay: float) -> TimeOffset | None:
+        """The offset that `init navigate` proposes."""
+        nonlocal offset
+        offset = clock_offset(without_repeats(fixes)[0], imu, delay)
+        return offset
+
+    try:
         fixes, shifted = on_clock_of(gnss, imu)
         found += [shifted] if shifted else []
-        found += gnss_readiness(fixes, imu, part=log.part_s(index_of(imu)[0]))
-        offset = time_offset(fixes, imu)
+        found += gnss_readiness(fixes, imu, part=log.part_s(index_of(imu)[0]), search=search)
     except DataError as error:
         return None, [*found, error.finding]
     if offset is None:

@@ -28,6 +28,7 @@ from strapdown.formats.recording import Recording
 from strapdown.frames import ways_between
 from strapdown.navigation.measurements.clock_windows import (
     ClockStep,
+    receiver_clock,
     stamp_step,
     step_finding,
     unsure_steps,
@@ -35,9 +36,9 @@ from strapdown.navigation.measurements.clock_windows import (
 )
 from strapdown.navigation.measurements.gnss import LASTING
 from strapdown.navigation.measurements.gnss_clock import (
+    TimeOffset,
     check_overlap,
-    time_offset,
-    velocity_delay,
+    sure_delay,
 )
 from strapdown.navigation.measurements.gnss_course import check_turns
 from strapdown.navigation.measurements.gnss_readiness import (
@@ -65,7 +66,7 @@ from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["TAKEN", "Proposal", "propose"]
+__all__ = ["TAKEN", "Proposal", "clock_offset", "propose"]
 
 
 Array = NDArray[np.float64]
@@ -128,9 +129,10 @@ RULE = {"kind": "adaptive", "influence": "igg3", "scale": {"lowest": 1.0}}
 CODE_POSITION_SD, CODE_VELOCITY_SD = 5.0, 0.3
 #: Standard deviation of the offset between receiver stamps and sensor clock, s: search range.
 OFFSET_SD = 0.2
-#: A delay of velocities is used beyond so many standard deviations and this time, s; an offset of
-#: stamps likewise; the filter then estimates it from this standard deviation, s, at least.
-SURE, LEAST_DELAY = 4.0, 0.01
+#: A significant delay of velocities is used beyond this time, s; an offset of stamps beyond so many
+#: standard deviations and this time; the filter then estimates it from this standard deviation, s,
+#: at least.
+LEAST_DELAY = 0.01
 SIGNIFICANT, LEAST_OFFSET, LEAST_OFFSET_SD = 3.0, 0.01, 0.05
 #: An offset that is not significant is a state where its uncertainty times the speed exceeds the
 #: standard deviation of the positions so many times.
@@ -569,25 +571,18 @@ def _clock(
     # What may be a step costs no part of the record where it moves the vehicle by less than fixes.
     if step is not None and (step.certain or abs(step.size) * speed > place_sd):
         return _position_errors(fixes, 0.0), step
-    late = velocity_delay(fixes)
-    delay = 0.0 if late is None or late.delay < SURE * late.sd else late.delay
-    out = {"velocity_delay_s": round(delay, 3)} if delay > LEAST_DELAY else {}
-    out |= _position_errors(fixes, delay)
-    if _velocities_show_arm(fixes, imu):
-        out["lever_arm_sd_m"] = ARM_SD
-    antenna = _antenna(out)
-    scan = time_offset(fixes, imu, delay)
-    found = None if scan is None else (scan.offset, scan.sd)
+    delay = sure_delay(fixes)
+    out = _receiver_errors(fixes, imu, delay)
     if "position_sd_taken" in fixes.attrs and (scatter := white_position_sd(fixes, delay)):
         place_sd = min(place_sd, scatter[0])  # where nothing is stated
     span = float(index_of(fixes)[-1] - index_of(fixes)[0])
     apart, drift = QUARTZ, None
-    if windows is not None:
-        offsets = windows(start=0.0 if found is None else found[0], antenna=antenna)
+    known = sensors if drives else None
+    found, offsets = receiver_clock(fixes, imu, known, _antenna(out, delay))
+    if offsets is not None:
         step = offsets.step()
         if step is not None:
             return out, step
-        found = _agreed(found, offsets.joint())
         drift = offsets.drift()
     if drift is not None:
         apart = min(math.hypot(*drift), QUARTZ)
@@ -602,7 +597,7 @@ def _clock(
         if drives or speed * OFFSET_SD > FAR * place_sd or slow * OFFSET_SD > FAR:
             out |= {"time_offset_sd_s": OFFSET_SD} | walk
         return out, None
-    offset, sd = found
+    offset, sd = found.offset, found.sd
     if abs(offset) > max(SIGNIFICANT * sd, LEAST_OFFSET):
         out |= {"time_offset_s": round(offset, 3)}
         out |= {"time_offset_sd_s": round(max(2.0 * sd, LEAST_OFFSET_SD), 3)}
@@ -612,26 +607,36 @@ def _clock(
     return out, None
 
 
-def _agreed(
-    scanned: tuple[float, float] | None, fitted: tuple[float, float] | None
-) -> tuple[float, float] | None:
-    """Offset and sd by two estimates of the same record; None if they contradict each other.
+def clock_offset(fixes: pd.DataFrame, imu: pd.DataFrame, delay: float) -> TimeOffset | None:
+    """Offset of a receiver's clock, as `propose` finds it with a sensor that is not named.
 
-    Their errors are common in part: the sd is the smaller one.
+    Parameters
+    ----------
+    delay : float, s
+        Of its velocities.
     """
-    if scanned is None or fitted is None:
-        return scanned or fitted
-    (a, a_sd), (b, b_sd) = scanned, fitted
-    if abs(a - b) > SIGNIFICANT * math.hypot(a_sd, b_sd):
-        return None
-    share = b_sd**2 / (a_sd**2 + b_sd**2)
-    return share * a + (1.0 - share) * b, min(a_sd, b_sd)
+    until, drives = _motion(imu, fixes)
+    scatter, sensors = _scatter(imu), None
+    if drives and scatter is not None:
+        rest = _rest(_quiet(imu, until), until, rocks=True)
+        sensors = _stated({"sensors": _sensors(None, scatter, _rest_bias(imu, rest, None, fixes))})
+    antenna = _antenna(_receiver_errors(fixes, imu, delay), delay)
+    return receiver_clock(fixes, imu, sensors, antenna)[0]
 
 
-def _antenna(aid: dict[str, Any]) -> Antenna:
-    """Delay and correlated errors of a proposed receiver."""
+def _receiver_errors(fixes: pd.DataFrame, imu: pd.DataFrame, delay: float) -> dict[str, Any]:
+    """Significant delay of velocities, errors of positions, uncertainty of a tape."""
+    out = {"velocity_delay_s": round(delay, 3)} if delay > LEAST_DELAY else {}
+    out |= _position_errors(fixes, delay)
+    if _velocities_show_arm(fixes, imu):
+        out["lever_arm_sd_m"] = ARM_SD
+    return out
+
+
+def _antenna(aid: dict[str, Any], delay: float | None = None) -> Antenna:
+    """Delay and correlated errors of a proposed receiver; `delay`, s, if it is not as proposed."""
     return Antenna(
-        velocity_delay=aid.get("velocity_delay_s", 0.0),
+        velocity_delay=aid.get("velocity_delay_s", 0.0) if delay is None else delay,
         correlated_share=aid.get("position_correlated_share", 0.0),
         correlation_time=LASTING,
     )
@@ -642,7 +647,9 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
 
     The share by the scatter from fix to fix, which lacks what lasts; where the velocities show
     what lasts, by its size, which a receiver may understate. One that understates its scatter
-    says nothing of what lasts, either: nor does a scatter that motion or velocities may hide.
+    says nothing of what lasts, either: nor does a scatter that motion or velocities may hide. Of
+    most code receivers nearly all lasts; one that scatters by more of what it states may understate
+    it.
     Float solutions have errors of their own.
     """
     assumed = "position_sd_taken" in fixes.attrs
@@ -657,8 +664,9 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
     stated = float(np.nanmedian(values_of(fixes, POSITION_SD)[:, :2]))
     precise = white < PHASE if assumed else stated < SHOWS_ARM
     by_velocity = None if precise else lasting_position_sd(fixes, delay)
+    measured = bool(np.isfinite(values_of(fixes, VELOCITY_SD[:2])).any())
     usual = LASTS_BY_PHASE if white < PHASE else LASTS_BY_CODE
-    least, lasting, total = LASTS, 1.0 - part**2, 1.0
+    least, lasting, total, certain = LASTS, 1.0 - part**2, 1.0, UNDERSTATED
     if by_velocity is not None:
         least, quiet, slow = SHOWN, *(x**2 for x in by_velocity)
         if _velocities_as_taken(fixes) and quiet + slow < MISSTATED**2:
@@ -666,6 +674,12 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
         lasting = 1.0 - quiet / total
     elif not assumed and UNDERSTATED < part < MISSTATED and _shows_scatter(fixes, white):
         total, lasting = part**2 / (1.0 - usual), usual
+    elif not (assumed or precise or measured) and _shows_scatter(fixes, white):
+        if part < MISSTATED:
+            # Where the scatter is more than usual, less lasts, or the receiver understates all of
+            # it: nothing says which, and half of the excess is, in its logarithm, of each.
+            total, certain = max(1.0, part / math.sqrt(1.0 - usual)), 1.0
+            lasting = 1.0 - part**2 / total
     elif not assumed and precise:
         # The scatter is an upper bound of what is white.
         unsure = SHARE_SD * math.sqrt(SCATTER / len(fixes))
@@ -677,7 +691,7 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
         lasting = usual if by_velocity is None else max(lasting, usual)
     lasting = min(lasting, LASTS_MOST)
     out = {"position_correlated_share": round(lasting, 2)} if lasting >= least else {}
-    if math.sqrt(total) >= UNDERSTATED:
+    if total > 1.0 and math.sqrt(total) >= certain:
         out["position_sd_factor"] = round(math.sqrt(total), 2)
     if precise:
         out["lever_arm_sd_m"] = ARM_SD

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine import FineResult
@@ -56,7 +57,12 @@ from strapdown.navigation.modes import (
 from strapdown.navigation.navigator import Navigator, with_aids, with_states
 from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import GapPolicy, ImuPreprocessor, ends_of
-from strapdown.navigation.record import NavigationRecord, Span, innovation_labels
+from strapdown.navigation.record import (
+    NavigationRecord,
+    Span,
+    innovation_labels,
+    standard_deviations,
+)
 from strapdown.navigation.recorder import IntervalRecorder, Recorder
 from strapdown.navigation.recovery import longest, wrong_stretches
 from strapdown.navigation.replay import PipelineRun, relinearized, run_batch, starts_far
@@ -204,8 +210,8 @@ def run_navigation(
                 progress(f"smoothing: {mode}", ENDED)
 
             run = _about_smoothed(chain, source, recorder, run, far, show_pass)
-    if any(finding.code == UNSTATED for finding in source.findings):
-        late = 0.5 * float(np.median(np.diff(index_of(source.imu))))
+    late = 0.0 if spec.log is None else _late(source)
+    if late > 0.0:
         smoothed = None if run.smoothed is None else with_late_samples(run.smoothed, late)
         run = replace(run, record=with_late_samples(run.record, late), smoothed=smoothed)
     beside = None
@@ -305,12 +311,28 @@ def run_navigation(
     )
 
 
-def with_late_samples(record: NavigationRecord, late: float) -> NavigationRecord:
-    """Return a record whose velocities may be those of another instant than their stamps.
+def _late(source: NavigationSource) -> float:
+    """Standard deviation of the instant that samples are of, about their stamps, s.
 
-    Whether a row holds the rate at its stamp, or the mean since the row before, is half a step.
-    Fixes show the difference only as far as they follow the acceleration, a walk's steps not at
-    all: it adds to the velocities as an error of the size of the acceleration over that time.
+    A reading at an instant is that of the filter before it, which keeps what the rate cannot show:
+    one of first order that passes up to 0.32 of the rate is late by half a step, as those are that
+    consumer units offer for their rates. Whether a row is such a reading, or the mean since the row
+    before, is another half, where nothing states it. Means are those of units that correct it.
+    """
+    if source.imu.attrs["sampling"] == "mean":
+        return 0.0
+    half = 0.5 * float(np.median(np.diff(index_of(source.imu))))
+    unstated = any(finding.code == UNSTATED for finding in source.findings)
+    return half * math.sqrt(2.0) if unstated else half
+
+
+def with_late_samples(record: NavigationRecord, late: float) -> NavigationRecord:
+    """Return a record whose states may be those of another instant than their stamps.
+
+    Fixes do not show it: an offset of their clock is that to the motion that the samples show, and
+    velocities show it only as far as they follow the acceleration, a walk's steps not at all. It
+    adds to position, velocity and attitude as an error of the size of the velocity, acceleration
+    and rate over that time.
 
     Parameters
     ----------
@@ -320,20 +342,38 @@ def with_late_samples(record: NavigationRecord, late: float) -> NavigationRecord
     time = index_of(record.trajectory)
     if len(time) < 2:
         return record
-    # Mean squares over a second: the bound is one of its size, not of its phase.
     steps = np.diff(time)
-    square = np.square(np.diff(values_of(record.trajectory, VELOCITY), axis=0) / steps[:, None])
-    sums = np.concatenate([np.zeros((1, 3)), np.cumsum(square * steps[:, None], axis=0)])
+    velocity, euler = (values_of(record.trajectory, names) for names in (VELOCITY, EULER))
+    rates = np.hstack([np.diff(velocity, axis=0), _turns(np.radians(euler))]) / steps[:, None]
+    # Mean squares over a second: the bound is one of its size, not of its phase.
+    sums = np.concatenate([np.zeros((1, 6)), np.cumsum(np.square(rates) * steps[:, None], axis=0)])
     marks = index_of(record.sd)
     begin, end = (np.clip(marks + side, time[0], time[-1]) for side in (-0.5, 0.5))
     length = np.maximum(end - begin, 1e-9)
+    moved = np.column_stack([np.interp(marks, time, velocity[:, k]) for k in range(3)])
     covariance = np.array(record.covariance)
-    for k in range(3):
+    covariance[:, :3, :3] += late**2 * moved[:, :, None] * moved[:, None, :]
+    for k in range(6):
         grown = np.interp(end, time, sums[:, k]) - np.interp(begin, time, sums[:, k])
         covariance[:, 3 + k, 3 + k] += late**2 * grown / length
-    sd = record.sd.copy()
-    sd[VELOCITY] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)[:, 3:6])
+    nearest = np.clip(time.searchsorted(marks), 0, len(time) - 1)
+    sd = standard_deviations(marks, covariance, euler[nearest], source_of(record.sd))
     return replace(record, sd=sd, covariance=covariance)
+
+
+def _turns(euler: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations about north, east, down between rows of roll, pitch, heading, rad, (n - 1, 3)."""
+    euler = np.unwrap(euler, axis=0)
+    roll, pitch, heading = np.diff(euler, axis=0).T
+    _, at_pitch, at = 0.5 * (euler[1:] + euler[:-1]).T
+    level = roll * np.cos(at_pitch)
+    return np.column_stack(
+        [
+            level * np.cos(at) - pitch * np.sin(at),
+            level * np.sin(at) + pitch * np.cos(at),
+            heading - roll * np.sin(at_pitch),
+        ]
+    )
 
 
 def _with_offsets(

@@ -13,16 +13,18 @@ from tests.coded import coded
 from tests.town_drive import motion
 
 import strapdown as sd
-from strapdown.config.logs import DoctorSpec
+from strapdown.config.logs import DoctorSpec, FixesTable, LogTable
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import READERS, csv, read_log
 from strapdown.formats.clocks import clock_of
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.writers import table_columns
+from strapdown.navigation.measurements import clock_windows
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.systems.doctor import USES
+from strapdown.systems.navigation_proposal import propose
 from strapdown.tables import gnss_table
 
 RATE, REST, MOVING = 100.0, 20.0, 60.0
@@ -254,8 +256,13 @@ def drive():
     return imu, simulate_gnss(motion(), receiver, seed=5)
 
 
-def test_the_offset_of_the_receivers_clock_is_found(drive, tmp_path):
+def test_the_offset_of_the_receivers_clock_is_found(drive, tmp_path, monkeypatch):
     imu, gnss = drive
+    searches = []
+    search = clock_windows.time_offset
+    monkeypatch.setattr(
+        clock_windows, "time_offset", lambda *given: searches.append(1) or search(*given)
+    )
     log, fixes = tmp_path / "imu.csv", tmp_path / "fixes.csv"
     written(pd.DataFrame(np.column_stack([imu.index, imu.to_numpy()]), columns=COLUMNS), log)
     csv.write(fixes, table_columns(gnss), {})
@@ -265,8 +272,16 @@ def test_the_offset_of_the_receivers_clock_is_found(drive, tmp_path):
     late = gnss.copy()
     late.index = gnss.index + 0.7
     csv.write(fixes, table_columns(late), {})
+    searches.clear()
     one, _ = sd.doctor([log, fixes], fix=tmp_path / "clean.csv").logs
     (fault,) = one.faults
+    assert len(searches) == 1
+    # The same value as `init navigate` proposes.
+    proposed = propose(LogTable(path=str(log)), gnss=FixesTable(path=str(fixes))).table["aiding"][
+        "gnss"
+    ]
+    assert proposed["time_offset_s"] == round(one.data["receiver_clock"]["offset_s"], 3)
+    assert fault.data["offset"] == one.data["receiver_clock"]["offset_s"]
     assert one.answer("navigation") == "with limits"
     assert fault.code == "navigation.receiver-clock-off"
     assert np.array_equal(read_gnss(tmp_path / "clean-gnss.csv"), read_gnss(fixes))

@@ -1,15 +1,21 @@
-"""When the samples of a log were taken, and what it costs a velocity not to know it."""
+"""When the samples of a log were taken, and what it costs a state not to know it."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
+from strapdown.errors import Finding
 from strapdown.navigation.record import NavigationRecord
-from strapdown.systems.navigation_run import with_late_samples
-from strapdown.systems.navigation_source import on_even_clock
-from strapdown.tables import ACCEL, GYRO, TRAJECTORY, TRAJECTORY_ERROR
+from strapdown.systems.navigation_run import _late, with_late_samples
+from strapdown.systems.navigation_source import UNSTATED, on_even_clock
+from strapdown.tables import ACCEL, EULER, GYRO, TRAJECTORY, TRAJECTORY_ERROR, VELOCITY
+from strapdown.tables.checks import index_of
 
 STEP = 0.005
 
@@ -64,8 +70,51 @@ def test_a_velocity_is_as_uncertain_as_the_acceleration_over_the_instant():
     more = np.sqrt(out.sd["VN"].to_numpy()[1:-1] ** 2 - 0.003**2)
     assert more == pytest.approx(late * 2.0 * rate / np.sqrt(2.0), rel=0.02)
     assert out.covariance[:, 3, 3] == pytest.approx(np.square(out.sd["VN"].to_numpy()))
-    others = [name for name in TRAJECTORY_ERROR if name != "VN"]
+    others = [name for name in TRAJECTORY_ERROR if name not in ("VN", "north", *EULER)]
     assert (out.sd[others] == swings.sd[others]).all(axis=None)
     assert (swings.covariance[:, 3, 3] == 0.003**2).all()
     steady = with_late_samples(record(lambda time: 0.0 * time + 30.0), late)
-    assert steady.sd.to_numpy() == pytest.approx(0.003)
+    assert steady.sd[VELOCITY].to_numpy() == pytest.approx(0.003)
+
+
+def test_a_position_is_as_uncertain_as_the_velocity_over_the_instant():
+    late = 0.005
+    out = with_late_samples(record(lambda time: 0.0 * time + 30.0), late)
+    assert out.sd["north"].to_numpy() == pytest.approx(np.hypot(0.003, 30.0 * late))
+    assert out.sd[["east", "down"]].to_numpy() == pytest.approx(0.003)
+    assert out.covariance[:, 0, 0] == pytest.approx(0.003**2 + (30.0 * late) ** 2)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_an_attitude_is_as_uncertain_as_its_rate_over_the_instant(axis):
+    late, rate = 0.005, np.radians(40.0)
+    still = record(lambda time: 0.0 * time)
+    # The body turns about an axis of its own that is tilted against all three of north-east-down.
+    begin = Rotation.from_euler("ZYX", [70.0, 25.0, -35.0], degrees=True)
+    turned = begin * Rotation.from_rotvec(
+        rate * index_of(still.trajectory)[:, None] * np.eye(3)[axis]
+    )
+    table = still.trajectory.copy()
+    table[EULER] = turned.as_euler("ZYX", degrees=True)[:, ::-1]
+    moved = with_late_samples(replace(still, trajectory=table), late)
+    added = (moved.covariance - still.covariance)[:, 6:, 6:]
+    # Over a second the axis stays nearly where it is: the mean square is that of its directions.
+    rows = np.searchsorted(index_of(table), index_of(moved.sd))
+    want = np.square(late * rate * turned[rows].as_matrix()[:, :, axis])
+    got = np.diagonal(added, axis1=1, axis2=2)
+    assert got[1:-1] == pytest.approx(want[1:-1], abs=2e-3 * (late * rate) ** 2)
+
+
+def logged(sampling, *codes):
+    """A source of samples at 100 Hz."""
+    imu, _ = walk(0.0)
+    imu.attrs["sampling"] = sampling
+    findings = tuple(Finding(code) for code in codes)
+    return SimpleNamespace(imu=imu, findings=findings)
+
+
+def test_readings_at_an_instant_are_late_by_a_filter_and_means_are_not():
+    assert _late(logged("mean")) == 0.0
+    assert _late(logged("instantaneous")) == pytest.approx(0.5 * STEP)
+    unstated = _late(logged("instantaneous", UNSTATED))
+    assert unstated == pytest.approx(0.5 * STEP * np.sqrt(2.0))

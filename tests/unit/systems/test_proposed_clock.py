@@ -6,6 +6,7 @@ import sys
 import tomllib
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,8 +15,10 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import town_drive as town
 from strapdown.config.logs import FixesTable, LogTable
-from strapdown.navigation.measurements.clock_windows import Offsets
+from strapdown.navigation.measurements import clock_windows
+from strapdown.navigation.measurements.clock_windows import Offsets, receiver_clock
 from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.gnss_clock import TimeOffset
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import simulate_imu
 from strapdown.systems import navigation_draft, navigation_proposal
@@ -24,7 +27,6 @@ from strapdown.systems.navigation_proposal import (
     APART,
     NO_ERRORS,
     OFFSET_SD,
-    _agreed,
     _clock,
     propose,
 )
@@ -179,7 +181,7 @@ def windows(rate, sd_rate, count=6):
 def test_a_drift_is_stated_where_it_is_significant_or_unknown(monkeypatch, rate, sd, drifts):
     made = windows(rate, sd)
     assert made.drift() == (pytest.approx(rate, abs=1e-12), pytest.approx(sd))
-    monkeypatch.setattr(navigation_proposal, "window_offsets", lambda *_, **__: made)
+    monkeypatch.setattr(clock_windows, "window_offsets", lambda *_, **__: made)
     found, _ = _clock(straight(60.0, 0.02, 360.0), imu(), True, NO_ERRORS)
     assert (DRIFT in found) == drifts
     if drifts:
@@ -189,12 +191,36 @@ def test_a_drift_is_stated_where_it_is_significant_or_unknown(monkeypatch, rate,
     assert DRIFT not in _clock(straight(60.0, 5.0, 360.0), imu(), True, NO_ERRORS)[0]
 
 
-def test_two_estimates_of_an_offset_are_joined_or_contradict_each_other():
-    assert _agreed(None, (0.3, 0.05)) == _agreed((0.3, 0.05), None) == (0.3, 0.05)
-    offset, sd = _agreed((0.13, 0.06), (0.29, 0.08))
-    assert offset == pytest.approx((0.13 / 0.06**2 + 0.29 / 0.08**2) / (0.06**-2 + 0.08**-2))
-    assert sd == 0.06
-    assert _agreed((-0.2, 0.08), (0.32, 0.07)) is None
+@pytest.mark.parametrize(
+    ("scan", "fit", "both"),
+    [
+        (None, (0.3, 0.05), (0.3, 0.05)),
+        ((0.3, 0.05), None, (0.3, 0.05)),
+        (
+            (0.13, 0.06),
+            (0.29, 0.08),
+            ((0.13 / 0.06**2 + 0.29 / 0.08**2) / (0.06**-2 + 0.08**-2), 0.06),
+        ),
+        ((-0.2, 0.08), (0.32, 0.07), None),
+        (None, None, None),
+    ],
+)
+def test_two_estimates_of_an_offset_are_joined_or_contradict_each_other(
+    monkeypatch, scan, fit, both
+):
+    found = None if scan is None else TimeOffset(*scan, 0.9, "course")
+    monkeypatch.setattr(clock_windows, "time_offset", lambda *_: found)
+    monkeypatch.setattr(
+        clock_windows, "window_offsets", lambda *_: SimpleNamespace(joint=lambda: fit)
+    )
+    offset, windows = receiver_clock(None, None, NO_ERRORS)
+    assert windows is not None
+    if both is None:
+        assert offset is None
+    else:
+        assert (offset.offset, offset.sd) == (pytest.approx(both[0]), both[1])
+        assert offset.by == ("windows" if scan is None else "course")
+    assert receiver_clock(None, None) == (found, None)
 
 
 def stepped(folder, size, at=40.0, outage=0.0):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -15,6 +16,7 @@ from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.errors import DataError, DivergenceError, Finding
 from strapdown.frames import place_difference, ways_between
+from strapdown.navigation.measurements.gnss_clock import TimeOffset, time_offset
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GEODETIC, GYRO, VELOCITY, VELOCITY_SD
 from strapdown.tables.checks import index_of, source_of, values_of
@@ -22,6 +24,7 @@ from strapdown.tables.checks import index_of, source_of, values_of
 __all__ = [
     "ClockStep",
     "Offsets",
+    "receiver_clock",
     "stamp_step",
     "step_finding",
     "unsure_steps",
@@ -50,6 +53,8 @@ AGREES = 0.3
 #: A window beyond so many standard deviations of the others has a fault of its own; a step of the
 #: clock is found from so many, from this size, s, and from so many windows on each side.
 STRAYS, CLEAR, LEAST_STEP, SIDE = 4.0, 6.0, 0.2, 2
+#: Two estimates of an offset agree within so many standard deviations.
+AGREED = 3.0
 #: Stamps are regular where all but a few intervals are whole multiples of the usual one, to this
 #: part of it and to so many standard deviations of the others; fewest fixes that show it.
 IRREGULAR, BEYOND, FEW, FEWEST = 0.05, 6.0, 3, 20
@@ -184,6 +189,46 @@ def window_offsets(
                 break
     values = np.array(found, dtype=np.float64).reshape(-1, 2)
     return Offsets(np.array(spans).reshape(-1, 2), values[:, 0], values[:, 1])
+
+
+def receiver_clock(
+    gnss: pd.DataFrame,
+    imu: pd.DataFrame,
+    sensors: ImuUncertainty | None = None,
+    antenna: Antenna = Antenna(),  # noqa: B008
+) -> tuple[TimeOffset | None, Offsets | None]:
+    """Find the offset of a receiver's clock by the whole record and by windows of it.
+
+    Parameters
+    ----------
+    sensors : ImuUncertainty, optional
+        Of a vehicle that drives, whose windows show the offset; without it the whole record does.
+    antenna : Antenna
+        Its delay and its correlated errors.
+
+    Returns
+    -------
+    offset : TimeOffset or None
+        None where nothing shows it, or both contradict each other. Their errors are common in part:
+        the standard deviation is the smaller one.
+    windows : Offsets or None
+        None without `sensors`.
+    """
+    scan = time_offset(gnss, imu, antenna.velocity_delay)
+    if sensors is None:
+        return scan, None
+    windows = window_offsets(gnss, imu, sensors, 0.0 if scan is None else scan.offset, antenna)
+    joint = windows.joint()
+    if joint is None:
+        return scan, windows
+    offset, sd = joint
+    if scan is None:
+        return TimeOffset(offset, sd, None, "windows"), windows
+    if abs(scan.offset - offset) > AGREED * math.hypot(scan.sd, sd):
+        return None, windows
+    share = sd**2 / (scan.sd**2 + sd**2)
+    offset, sd = share * scan.offset + (1.0 - share) * offset, min(scan.sd, sd)
+    return replace(scan, offset=offset, sd=sd), windows
 
 
 def _thinned(imu: pd.DataFrame) -> pd.DataFrame:

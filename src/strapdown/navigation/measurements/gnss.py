@@ -345,7 +345,11 @@ def _by_offset(
     state is. At rest it is error alone, and in steady motion its changes are: as a derivative they
     would make the errors of the state observe the offset, whose standard deviation falls falsely.
     So it stays what it was at the last epoch as far as its change is not clear of its own error;
-    the rest is noise, in proportion to the offset's variance.
+    the rest is noise, in proportion to the offset's variance. And a velocity that the last fixes
+    corrected has their errors, with which the innovation is correlated, by more than the filter
+    knows where the noise of its sensors is overstated, as that of a unit that shakes is: times the
+    offset, that is a drift of the offset. The latest corrections are not in it, as far as they are
+    not clear of its error.
 
     Parameters
     ----------
@@ -362,6 +366,9 @@ def _by_offset(
     kept = f"{name}.{'velocity' if code == POSITION_CODE else 'acceleration'}"
     before = view.kept.get(kept, np.zeros(3))
     change = shift - before
+    if code == POSITION_CODE:
+        recent = view.corrected
+        change = change - recent * np.minimum(1.0, CLEAR**2 * own / np.maximum(recent**2, TINY))
     clear = before + change * np.maximum(1.0 - CLEAR**2 * own / np.maximum(change**2, TINY), 0.0)
     view.kept[kept] = clear
     return clear, P[at, at] * (np.square(shift - clear) + own)

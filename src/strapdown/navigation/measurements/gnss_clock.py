@@ -24,6 +24,7 @@ __all__ = [
     "check_overlap",
     "find_time_offset",
     "find_velocity_delay",
+    "sure_delay",
     "time_offset",
     "velocity_delay",
 ]
@@ -40,8 +41,10 @@ UNIX = (7.9e8, 2.21e9)
 LARGEST, STEP, FINE_STEP = 20.0, 0.1, 0.025
 #: Steps about the result: whose misfits count, and to which a parabola is fitted.
 AROUND, FITTED = 20, 4
-#: Below this speed, m/s, a course is not usable.
-LEAST_SPEED = 3.0
+#: Below this speed, m/s, a course is not usable; of velocities that are measured, below so many of
+#: their standard deviations and the speed of a slow walk. An offset less certain than this, s, is
+#: not known.
+LEAST_SPEED, PRECISE, SLOW_WALK, UNCLEAR = 3.0, 10.0, 0.7, 0.5
 #: Lever arm of an antenna from the unsteered axle, m, one standard deviation of an element; the
 #: time over which a rate at an instant is taken, s; and the standard deviation of a result from
 #: steps whose residuals are correlated over that from independent ones.
@@ -67,15 +70,15 @@ class TimeOffset:
     Attributes
     ----------
     offset, sd : float, s
-    share : float
-        Of the changes of that course or speed that the sensors explain.
-    by : {'course', 'speed'}
+    share : float or None
+        Of the changes of that course or speed that the sensors explain; None of windows alone.
+    by : {'course', 'speed', 'windows'}
         Main source of the estimate.
     """
 
     offset: float
     sd: float
-    share: float
+    share: float | None
     by: str
 
 
@@ -177,11 +180,15 @@ def time_offset(
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
     course = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
     steps = np.diff(at)
-    ready = (steps <= LONGEST_STEP) & (np.minimum(speed[1:], speed[:-1]) > LEAST_SPEED)
+    least = LEAST_SPEED
+    if (measured := usable(gnss, VELOCITY_SD[:2])).any():
+        sd = float(np.median(values_of(gnss, VELOCITY_SD[:2])[measured]))
+        least = min(LEAST_SPEED, max(SLOW_WALK, PRECISE * sd))
+    ready = (steps <= LONGEST_STEP) & (np.minimum(speed[1:], speed[:-1]) > least)
     turns = np.abs(np.diff(course)) < 0.5 * math.pi
     if not ready.any():
         return None
-    slow = np.maximum(speed, LEAST_SPEED)
+    slow = np.maximum(speed, least)
     found = [
         one
         for name, change, columns, used, per_rate in (
@@ -195,24 +202,22 @@ def time_offset(
     weights = np.array([one.sd**-2 for one in found])
     offsets = np.array([one.offset for one in found])
     offset, sd = float(weights @ offsets / weights.sum()), float(weights.sum() ** -0.5)
-    if np.ptp(offsets) > 4.0 * math.hypot(*(one.sd for one in found)):
+    if np.ptp(offsets) > 4.0 * math.hypot(*(one.sd for one in found)) or sd > UNCLEAR:
         return None
     best = found[int(np.argmax(weights))]
     return TimeOffset(offset, sd, best.share, best.by)
 
 
 def find_time_offset(
-    gnss: pd.DataFrame,
-    imu: pd.DataFrame,
-    assumed: float = 0.0,
-    velocity_delay: float = 0.0,
-    assumed_sd: float = 0.0,
+    gnss: pd.DataFrame, found: TimeOffset | None, assumed: float = 0.0, assumed_sd: float = 0.0
 ) -> list[Finding]:
     """Report an offset that is significant, and beyond the assumed one.
 
     Parameters
     ----------
-    assumed, velocity_delay, assumed_sd : float, s
+    found : TimeOffset or None
+        Of these fixes, as of `time_offset`.
+    assumed, assumed_sd : float, s
         As configured; an offset within three standard deviations is left to the filter.
 
     Returns
@@ -220,7 +225,6 @@ def find_time_offset(
     list of Finding
         With the option that removes it; empty without a significant offset.
     """
-    found = time_offset(gnss, imu, velocity_delay)
     if found is None or abs(found.offset - assumed) < max(
         SURE * found.sd, LEAST_OFFSET, 3.0 * assumed_sd
     ):
@@ -530,6 +534,12 @@ def velocity_delay(table: pd.DataFrame) -> VelocityDelay | None:
     return VelocityDelay(
         delay, float(np.sqrt(max(variance, least))) / power, changing, int(near.sum())
     )
+
+
+def sure_delay(table: pd.DataFrame) -> float:
+    """Return the delay of the velocity, s, as far as it is significant, and zero otherwise."""
+    found = velocity_delay(table)
+    return 0.0 if found is None or found.delay < GNSS_DELAY_SURE * found.sd else found.delay
 
 
 def find_velocity_delay(table: pd.DataFrame, assumed: float = 0.0) -> list[Finding]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
@@ -16,10 +17,12 @@ from strapdown.navigation.measurements.clock_windows import stamp_step, step_fin
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.gnss_clock import (
     WHOLE,
+    TimeOffset,
     check_overlap,
     find_time_offset,
     find_velocity_delay,
-    velocity_delay,
+    sure_delay,
+    time_offset,
 )
 from strapdown.navigation.measurements.gnss_course import check_turns
 from strapdown.tables import (
@@ -49,6 +52,7 @@ def gnss_readiness(
     imu: pd.DataFrame | None = None,
     aid: Gnss | None = None,
     part: tuple[float, float] = WHOLE,
+    search: Callable[[float], TimeOffset | None] | None = None,
 ) -> tuple[Finding, ...]:
     """Check fixes by themselves, and against the inertial record.
 
@@ -62,6 +66,9 @@ def gnss_readiness(
         As it is configured: options already set are not reported again.
     part : (2,), s
         Of the record that was asked for, on the clock of `imu`.
+    search : callable, optional
+        Gives the offset of the receiver's clock at a delay of its velocities, s; `time_offset`, if
+        not given.
 
     Returns
     -------
@@ -84,11 +91,10 @@ def gnss_readiness(
     step = stamp_step(table)
     if step is not None and step.certain:
         found.append(step_finding(table, imu, step))
-    delay = aid.velocity_delay
-    if not delay and (measured := velocity_delay(table)) is not None:
-        delay = measured.delay
+    delay = aid.velocity_delay or sure_delay(table)
     found += check_turns(table, imu, delay)
-    found += find_time_offset(table, imu, aid.time_offset, delay, aid.time_offset_sd)
+    offset = time_offset(table, imu, delay) if search is None else search(delay)
+    found += find_time_offset(table, offset, aid.time_offset, aid.time_offset_sd)
     return tuple(found)
 
 

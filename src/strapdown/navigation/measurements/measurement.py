@@ -310,6 +310,9 @@ class View:
         the present body axes; for an aid that uses them (`Aid.wants_steady`).
     unobserved : float, s
         Time since the last observation.
+    corrected : ndarray, (3,), m/s
+        What the latest updates corrected the velocity by, north-east-down: a fading sum over some
+        seconds, for an aid that wants `steady`.
     kept : dict of str to ndarray
         What aids keep from epoch to epoch, by names of theirs; arrays are replaced, never changed.
     """
@@ -325,6 +328,7 @@ class View:
     covariance_of: Callable[[], Array] | None = None
     steady: Array | None = None
     unobserved: float = 0.0
+    corrected: Array = field(default_factory=lambda: np.zeros(3))
     kept: dict[str, Array] = field(default_factory=dict)
 
     @cached_property

@@ -109,13 +109,13 @@ def test_the_offset_of_the_clocks_is_found_to_a_tenth_of_a_second(offset):
     found = time_offset(table, imu())
     assert found.offset == pytest.approx(offset, abs=0.05)
     assert found.offset == pytest.approx(offset, abs=3.0 * found.sd)
-    (told,) = find_time_offset(table, imu())
+    (told,) = find_time_offset(table, found)
     assert "time_offset_s" in told.remedy
     leap = told.code == "navigation.receiver-clock-off-leap-seconds"
     assert leap == (offset == 18.0)
     # What the filter is to find is not told again.
-    assert not find_time_offset(table, imu(), found.offset)
-    assert not find_time_offset(table, imu(), 0.0, 0.0, assumed_sd=abs(offset))
+    assert not find_time_offset(table, found, found.offset)
+    assert not find_time_offset(table, found, 0.0, assumed_sd=abs(offset))
 
 
 @pytest.mark.parametrize("decimals", [16, 12, 9])
@@ -149,6 +149,32 @@ def test_the_first_steps_are_enough_for_the_offset_of_a_long_record(monkeypatch)
     later.attrs = dict(table.attrs)
     later.iloc[-20:, later.columns.get_loc("VN")] += 30.0
     assert time_offset(later, imu()) == half
+
+
+@pytest.mark.parametrize("offset", [0.0, -0.43])
+def test_precise_velocities_show_the_offset_of_a_walk(offset):
+    """At 1 to 1.8 m/s, with corners; velocities of 0.3 m/s do not."""
+    time = np.arange(0.0, 150.0, 0.02)
+    rate, force = np.zeros((2, len(time), 3))
+    for k in range(1, 15):
+        rate[:, 2] += (-1) ** (k // 3) * 0.9 * np.exp(-np.square((time - 9.7 * k) / 0.9))
+    speed = 1.4 + 0.25 * np.sin(0.9 * time) + 0.15 * np.sin(2.3 * time)
+    force[:, 0], force[:, 2] = np.gradient(speed, time), -9.81
+    course = np.append(0.0, np.cumsum(rate[:-1, 2] * 0.02))
+    flat = imu_table(time, rate, force)
+    rng = np.random.default_rng(4)
+    walks = speed[:, None] * np.column_stack([np.cos(course), np.sin(course), 0.0 * time])
+    place = np.tile([50.0, 8.0, 100.0], (len(time), 1))
+    for sd in (0.03, 0.3):
+        sds = np.full((len(time), 3), sd)
+        velocity = walks + sd * rng.standard_normal(walks.shape)
+        table = gnss_table(time + offset, place, velocity, 5.0 + 0.0 * sds, sds).iloc[::25]
+        found = time_offset(table, flat)
+        if sd == 0.3:
+            assert found is None
+        else:
+            assert found.offset == pytest.approx(offset, abs=min(0.15, 3.0 * found.sd))
+            assert found.sd < 0.15  # of 0.2 s that are assumed otherwise
 
 
 def test_places_alone_are_enough_for_the_offset():

@@ -112,9 +112,31 @@ def test_white_errors_have_no_share_that_lasts():
     table = fixes(8502, lasting=0.0)
     table[POSITION_SD] = WHITE
     assert _position_errors(table, 0.0) == {}
-    table[VELOCITY_SD] = np.inf
-    assert _position_errors(table, 0.0) == {}
     assert white_position_sd(table.iloc[:20]) is None
+
+
+def test_a_scatter_as_large_as_stated_may_be_of_a_receiver_that_understates():
+    """Nearly all of a code receiver's error lasts, and nothing shows it without velocities.
+
+    What is new with each fix stays as it is measured.
+    """
+    table = town.fixes(8502, rate=4.0, position_noise=WHITE)
+    table[POSITION_SD] = WHITE
+    table[VELOCITY_SD] = np.inf
+    _, part = white_position_sd(table)
+    proposed = _position_errors(table, 0.0)
+    total, share = proposed["position_sd_factor"] ** 2, proposed["position_correlated_share"]
+    assert total == pytest.approx(part / np.sqrt(0.1), rel=0.01)
+    assert total * (1.0 - share) == pytest.approx(part**2, rel=0.05)
+    # Of one that scatters as little as usual nothing is added.
+    table[POSITION_SD] = 4.0 * WHITE
+    assert "position_sd_factor" not in _position_errors(table, 0.0)
+    # Left as they are: a receiver with velocities that hide it, and fixes whose scatter is hidden.
+    table[POSITION_SD], table[VELOCITY_SD] = WHITE, 2.0
+    assert _position_errors(table, 0.0) == {}
+    rare = town.fixes(8502, rate=1.0, position_noise=WHITE)
+    rare[POSITION_SD], rare[VELOCITY_SD] = WHITE, np.inf
+    assert _position_errors(rare, 0.0) == {}
 
 
 def test_an_antenna_of_precise_fixes_is_measured_by_a_tape():
