@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 
 import numpy as np
 import pytest
@@ -83,3 +84,46 @@ def test_what_cannot_be_read_at_all_is_refused(run_cli, tmp_path):
     assert done.code == 3
     assert not (tmp_path / "out").exists()
     assert run_cli("doctor", tmp_path / "none.csv").code == 4
+
+
+@pytest.fixture(scope="module")
+def with_fixes(log):
+    """Fixes of the minute of the log, with a latitude of another name and no unit of the speed."""
+    path = log.parent / "fixes.csv"
+    rows = (f"{k},{50 + 1e-5 * k:.6f},30,100,{4.0:.1f},0" for k in range(60))
+    path.write_text("\n".join(["time,latE7,lon,alt,speed,course", *rows]) + "\n")
+    return path
+
+
+def test_options_of_fixes_are_those_of_the_file_of_fixes(log, with_fixes, run_cli, tmp_path):
+    """They were refused of the samples beside it, which have no such column."""
+    options = ("--gnss-columns", "lat=latE7", "--gnss-units", "lat=deg,speed=km/h")
+    for logs in ((log, with_fixes), (with_fixes, log)):
+        out = tmp_path / logs[0].stem
+        done = run_cli("doctor", *logs, *options, "--out", out)
+        assert done.code == 0, done.err
+        found = {one["name"]: one for one in json.loads((out / "doctor.json").read_text())["logs"]}
+        assert found["log.csv"]["fixes_from"] == "fixes.csv"
+        flags = "--gnss-columns=lat=latE7 --gnss-units=lat=deg,speed=km/h"
+        assert found["log.csv"]["fixes_options"] == flags
+        # The answers as inferred are asked of both files again.
+        names = " ".join(map(str, logs))
+        _, _, asked = next(x for x in done.out.splitlines() if ": strapdown" in x).partition(": ")
+        assert asked == f"strapdown doctor {names} --gyro-unit rad/s --repair {flags}"
+        again = run_cli(*shlex.split(asked)[1:], "--json", "--out", tmp_path / f"{logs[0].stem}-2")
+        assert [one["questions"] for one in json.loads(again.out)["logs"]] == [[], []]
+        page = (out / "report.html").read_text(encoding="utf-8")
+        assert f"strapdown doctor {logs[0].name} {logs[1].name} --gyro-unit" in page
+    done = run_cli("doctor", with_fixes, *options, "--out", tmp_path / "alone")
+    assert done.code == 0, done.err
+
+
+def test_options_of_fixes_that_no_file_has_are_refused(log, with_fixes, run_cli, tmp_path):
+    for logs in ((log,), (log, with_fixes), (with_fixes, log)):
+        done = run_cli("doctor", *logs, "--gnss-columns", "lat=y", "--out", tmp_path / "out")
+        assert done.code == 4
+        assert logs[-1 if logs[0] == log else 0].name in done.err
+    other = tmp_path / "other.csv"
+    other.write_bytes(log.read_bytes())
+    done = run_cli("doctor", log, other, "--gnss-columns", "lat=y", "--out", tmp_path / "out")
+    assert done.code == 4 and "log.csv" in done.err

@@ -28,6 +28,7 @@ from strapdown.attitude_comparison.comparison import (
 from strapdown.attitude_comparison.options import AttitudeOptions as AttitudeOptions
 from strapdown.attitude_comparison.references import motion_finding
 from strapdown.attitude_comparison.source import magnetic_north
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.increments import BETWEEN_STAMPS, increments_from_imu
 from strapdown.orientation_filters import (
@@ -243,15 +244,27 @@ def attitude(
 #: Rates that no person and no vehicle reaches, and those that few reach for a part of a log, rad/s;
 #: turn between samples, in the median, that no algorithm follows, rad.
 IMPOSSIBLE, FAST, FAST_SHARE, TURN = 100.0, 20.0, 0.05, 1.0
+#: Half of the magnitudes of a specific force are this near to gravity, as a share of it, at least
+#: of a body that does not move violently.
+NEAR_GRAVITY = 0.2
 _LOOKED_AT = 2000
 
 
 def _doubts(imu: pd.DataFrame) -> list[Finding]:
-    """Warn of rates and stamps that another unit would explain, by some of the samples."""
+    """Warn of rates and stamps that another unit or order would explain, by some of the samples."""
     rows = slice(None, None, max(1, len(imu) // _LOOKED_AT))
     rates = np.linalg.norm(view_of(imu, GYRO)[rows], axis=1)
     if len(imu) < 2 or not rates.size:
         return []
+    if set(ACCEL) <= set(imu.columns):
+        force = np.linalg.norm(imu[ACCEL].to_numpy(dtype=np.float64)[rows], axis=1)
+        felt = float(np.median(force[np.isfinite(force)])) if np.isfinite(force).any() else math.inf
+        lower, middle, upper = np.percentile(rates, [25.0, 50.0, 75.0])
+        near = abs(np.array([lower, upper]) / STANDARD_GRAVITY - 1.0) < NEAR_GRAVITY
+        if near.all() and felt < WEAKEST:
+            data = {"rate": float(middle), "force": felt}
+            code = "attitude.gyro-and-accel-exchanged"
+            return [Finding(code, quantity="gyro, accel", severity="warning", data=data)]
     time = imu.index.to_numpy(dtype=np.float64)
     step = float(time[-1] - time[0]) / (len(imu) - 1)
     if (turn := float(np.median(rates)) * step) > TURN:

@@ -153,7 +153,7 @@ class Heading(_OfKind):
 
 def navigate(
     imu: Any,
-    measurements: Sequence[Measurement] = (),
+    measurements: Measurement | Sequence[Measurement] = (),
     *,
     sensor: str | Path | None = None,
     start: Mapping[str, float] | None = None,
@@ -174,7 +174,7 @@ def navigate(
         Samples: s, rad/s (n, 3), m/s² (n, 3), body axes forward-right-down. A path is that of a
         log, or of a configuration (``.toml``), which then replaces all arguments except `smooth`
         and, as a file, `reference`.
-    measurements : sequence of Measurement
+    measurements : Measurement, or sequence of them
         `Gnss`, `NonHolonomic`, `ZeroVelocity`, `Odometer` …
     sensor : str or Path
         Data sheet: a name of the catalogue, or a ``.toml`` file.
@@ -198,6 +198,8 @@ def navigate(
     DivergenceError
         The state left the range of the mechanization.
     """
+    if isinstance(measurements, Measurement):
+        measurements = [measurements]
     if isinstance(imu, str | Path) and Path(imu).suffix.lower() == ".toml":
         table = isinstance(reference, pd.DataFrame)
         if len(measurements) or table or any(x is not None for x in (sensor, start, options)):

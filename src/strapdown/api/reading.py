@@ -24,7 +24,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.api.stamps import as_frame, by_time, flat, seconds_of
+from strapdown.api.stamps import as_frame, by_time, flat, plain_columns, seconds_of
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats import holds
@@ -304,13 +304,23 @@ def _as_file(source: str | Path | pd.DataFrame) -> Iterator[tuple[str | Path, st
         _require_path(source)
         yield source, None
         return
-    table = flat(source, ())
-    if table.index.name is not None or not isinstance(table.index, pd.RangeIndex):
-        table = table.reset_index(names=table.index.name or "time")
-    table.columns = [str(name) for name in table.columns]
+    if len(source) < 2:
+        raise DataError("api.table-too-short", count=len(source))
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    table, units = plain_columns(source)
+    try:
+        held = pa.Table.from_pandas(table, preserve_index=False)
+    except (pa.ArrowInvalid, pa.ArrowTypeError):  # values of several kinds in one column
+        raise DataError("api.not-numeric") from None
+    for k, name in enumerate(held.column_names):
+        if name in units:
+            field = held.schema.field(k).with_metadata({"unit": units[name]})
+            held = held.set_column(k, field, held.column(k))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "table"
-        table.to_parquet(file, index=False)
+        parquet.write_table(held, file)
         yield file, "parquet"
 
 

@@ -25,10 +25,51 @@ SI = ("rad/s", "m/s2", "uT")
 
 
 def as_frame(table: Any) -> Any:
-    """Return a table of another library (polars, pyarrow) as one of pandas; anything else as is."""
-    if isinstance(table, pd.DataFrame) or not callable(getattr(table, "to_pandas", None)):
-        return table
-    return table.to_pandas()
+    """Return a table of another library (polars, pyarrow) as one of pandas; anything else as is.
+
+    DataError: two columns have the same name.
+    """
+    if not isinstance(table, pd.DataFrame) and callable(getattr(table, "to_pandas", None)):
+        table = table.to_pandas()
+    if isinstance(table, pd.DataFrame):
+        _refuse_repeated(table.columns)
+    return table
+
+
+def _refuse_repeated(names: pd.Index) -> None:
+    texts = names if names.nlevels > 1 else names.map(str)
+    if not texts.is_unique:
+        name = texts[texts.duplicated()][0]
+        raise DataError("api.column-named-twice", name=name)
+
+
+def plain_columns(table: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, str]]:
+    """Return a table as columns of a file, and the units of those that were durations.
+
+    The index is a column, unless a column is the clock already; texts of numbers are numbers, and
+    NaN where they are not.
+    """
+    out = flat(table, ()).reset_index(drop=True).infer_objects()
+    out.attrs = {}
+    out.columns = [str(name) for name in out.columns]
+    clocked = any(read_name(name).quantity == "time" for name in out.columns)
+    for k in reversed(range(table.index.nlevels)):
+        level = table.index.get_level_values(k)
+        name = "time" if level.name is None else str(level.name)
+        # Integers without a name beside a clock count rows, of which some may have been left out.
+        counts = isinstance(level, pd.RangeIndex) or (clocked and level.dtype.kind in "iu")
+        if name not in out.columns and not (level.name is None and counts):
+            out.insert(0, name, level)
+    units = {}
+    for name in [str(name) for name in out.columns]:
+        column = out[name]
+        if column.dtype.kind == "m":
+            out[name], units[name] = seconds_of(column)[0], "s"
+        elif pd.api.types.is_string_dtype(column.dtype):
+            numbers = pd.to_numeric(column, errors="coerce")
+            if 2 * numbers.notna().sum() > column.notna().sum():
+                out[name] = numbers
+    return out, units
 
 
 def seconds_of(stamps: Any) -> tuple[Any, dict[str, Any]]:
@@ -99,5 +140,6 @@ def flat(table: pd.DataFrame, needed: Sequence[str]) -> pd.DataFrame:
             raise DataError("api.unit-of-level", quantity=name, unit=stated)
         names.append(name)
     out = table.set_axis(names, axis=1)
+    _refuse_repeated(out.columns)
     out.attrs = dict(table.attrs)
     return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -87,7 +87,7 @@ def doctor(
         result, seal = done
         paths = {one.name: log.path for log, one in zip(result.spec.logs, result.logs, strict=True)}
         for one in result.logs:
-            print_log(one, paths, tables=write.verbose)
+            print_log(one, paths, [x.log.path for x in result.logs], tables=write.verbose)
         print_findings(result.between)
         print_seal(seal, "doctor.json", write.no_report)
     if fix is not None:
@@ -98,10 +98,13 @@ def doctor(
             print_findings([finding for finding in said if finding is not None])
 
 
-def print_log(one: LogDiagnosis, paths: Mapping[str, str], *, tables: bool) -> None:
+def print_log(
+    one: LogDiagnosis, paths: Mapping[str, str], logs: Sequence[str], *, tables: bool
+) -> None:
     """Print what a log is fit for, its streams, and its faults with their fixes.
 
-    `paths`: of logs by name, for commands. `tables`: also those of channels and rests.
+    `paths`: of logs by name, for commands. `logs`: paths of all that were examined.
+    `tables`: also those of channels and rests.
     """
     from strapdown.cli.console import console, print_block
     from strapdown.report import doctor as report
@@ -134,7 +137,7 @@ def print_log(one: LogDiagnosis, paths: Mapping[str, str], *, tables: bool) -> N
     for note in one.notes:
         if note.code == "io.columns-not-used":
             out.print(_cut(note.sentence("cli")), style="dim")
-    if line := report.answering(one, one.log.path):
+    if line := report.answering(one, logs):
         from strapdown.cli.main import introduced  # which imports this module
 
         words = shlex.split(line)[1:]

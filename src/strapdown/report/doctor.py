@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -158,7 +158,7 @@ def command(
         beside = fixes or one.data["fixes_from"]
         flags += f" --gnss {shlex.quote(beside)}" if beside else ""
         flags = f"{flags} {one.data['fixes_options']}".strip()
-    return _line(COMMANDS[use], log or one.name, flags)
+    return _line(COMMANDS[use], flags, log or one.name)
 
 
 def way(one: LogDiagnosis, use: str) -> str | None:
@@ -168,18 +168,21 @@ def way(one: LogDiagnosis, use: str) -> str | None:
     return next((a for f in preventing if (a := f.advice("cli"))), None)
 
 
-def answering(one: LogDiagnosis, log: str | None = None) -> str | None:
-    """Return the command line that answers the open questions as inferred."""
+def answering(one: LogDiagnosis, logs: Sequence[str]) -> str | None:
+    """Return the command line that answers the open questions as inferred.
+
+    `logs`: the file and those that were examined with it.
+    """
     found = [one.refused if one.questions else None, refused_fixes(one)]
     more = [str(f.data.get("flags") or "") for f in found if f is not None]
     if not any(more) and not one.answers:
         return None  # the same command would be refused again
     flags = [str(one.data["options"]), *more, str(one.data["fixes_options"])]
-    return _line("doctor", log or one.name, " ".join(part for part in flags if part))
+    return _line("doctor", " ".join(part for part in flags if part), *logs)
 
 
-def _line(name: str, log: str, flags: str) -> str:
-    return f"strapdown {name} {shlex.quote(log)} {flags}".strip()
+def _line(name: str, flags: str, *logs: str) -> str:
+    return f"strapdown {name} {shlex.join(logs)} {flags}".strip()
 
 
 def wrong(one: LogDiagnosis) -> list[tuple[str, str, str]]:
@@ -297,11 +300,12 @@ def doctor_document(result: Diagnosis, name: str = "") -> Document:
     if name:
         sections.append(section("again", "Check this folder", *run_again(name)))
     title = ", ".join(one.name for one in result.logs)
-    front = (block for one in result.logs for block in _answer(one))
+    names = [one.name for one in result.logs]
+    front = (block for one in result.logs for block in _answer(one, names))
     return document_of(title, "Content of the log, and its faults", (), front, sections)
 
 
-def _answer(one: LogDiagnosis) -> tuple[Block | None, ...]:
+def _answer(one: LogDiagnosis, names: Sequence[str]) -> tuple[Block | None, ...]:
     shown = uses(one)
     good = not shown or any(one.answer(use) == "yes" for use in shown)
     rows = []
@@ -310,7 +314,7 @@ def _answer(one: LogDiagnosis) -> tuple[Block | None, ...]:
         text = f"{capital(reasons(one, use))}.{f' {capital(helps)}.' if helps else ''}"
         rows.append((f"{capital(use)}: {one.answer(use)}", text))
     commands = [line for use in shown if (line := command(one, use))]
-    ask = answering(one)
+    ask = answering(one, names)
     blanks = ", ".join(sorted(PLACEHOLDERS & set((ask or "").split())))
     asked = f"With {blanks} filled in, and" if blanks else "With"
     faults = [

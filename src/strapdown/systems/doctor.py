@@ -25,7 +25,7 @@ from strapdown.config.logs import (
 )
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.samples import running_integral, white_sd
-from strapdown.errors import DataError, Finding, Severity, StrapdownError
+from strapdown.errors import ConfigError, DataError, Finding, Severity, StrapdownError
 from strapdown.evaluation.differences import rotation_contradicted
 from strapdown.formats import (
     READERS,
@@ -219,6 +219,7 @@ def run_doctor(spec: DoctorSpec, progress: Progress = silent) -> Diagnosis:
     """
     logs: list[LogDiagnosis] = []
     unread: list[DataError] = []
+    unfit: dict[str, ConfigError] = {}
     # A file that the record of a crash names as its own is examined with it.
     named: set[Path] = set()
     if len(spec.logs) > 1:
@@ -231,9 +232,21 @@ def run_doctor(spec: DoctorSpec, progress: Progress = silent) -> Diagnosis:
             continue
         progress(f"examining {Path(log.path).name}", 0.05 + 0.7 * k / len(spec.logs))
         try:
-            logs.append(_diagnose(log, spec.axes_of(k), by_path.get(log.path)))
+            try:
+                logs.append(_diagnose(log, spec.axes_of(k), by_path.get(log.path)))
+            except ConfigError as error:
+                # Options of the fixes are those of the file of fixes, and not of samples beside it.
+                if log.path not in by_path or len(spec.logs) == 1:
+                    raise
+                without = _diagnose(log, spec.axes_of(k), None)
+                if {*without.streams} & {"imu", "gnss"} != {"imu"}:
+                    raise
+                logs.append(without)
+                unfit[log.path] = error
         except DataError as error:
             unread.append(error)
+    if unfit and len(unfit) == len(by_path):
+        raise next(iter(unfit.values()))
     if not logs:
         raise unread[0]
     alone = [k for k, one in enumerate(logs) if "gnss" in one.streams and "imu" not in one.streams]
@@ -355,6 +368,7 @@ def _with_fixes(one: LogDiagnosis, other: LogDiagnosis) -> LogDiagnosis:
     more = {
         "receiver_clock": clock,
         "fixes_from": other.name,
+        "fixes_options": other.data["fixes_options"],
         "stationary": [_rest(one.streams["imu"], rest) for rest in rests],
         "gravity": _gravity(one.streams["imu"], (*one.faults, *one.notes), rests),
     }

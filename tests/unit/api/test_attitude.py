@@ -350,3 +350,19 @@ def test_a_table_in_place_of_a_path_is_said_to_need_no_reading():
     for read in (sd.read_imu, sd.read_gnss):
         with pytest.raises(ConfigError, check=coded("api.table-for-path", kind="ndarray")):
             read(np.zeros((3, 7)))
+
+
+@pytest.mark.parametrize("algorithm", ["quaternion", "error-state"])
+@pytest.mark.parametrize("exchanged", [False, True])
+@pytest.mark.parametrize("spun", [0.0, 9.8])
+def test_exchanged_arguments_are_doubted(algorithm, exchanged, spun):
+    """A gyro that reads gravity beside an accelerometer that has none; a spin has both."""
+    time = np.arange(3000) * 0.01
+    gyro = np.column_stack([0.1 * np.sin(time), 0.2 * np.cos(0.7 * time), spun + 0.0 * time])
+    sway = 0.5 * np.sin(9.0 * time)
+    accel = np.column_stack([sway, -sway, -9.8 + sway])
+    given = (accel, gyro) if exchanged else (gyro, accel)
+    out = sd.attitude(time, *given, algorithm=algorithm)
+    found = [f for f in out.findings if f.code == "attitude.gyro-and-accel-exchanged"]
+    assert bool(found) == (exchanged and not spun)
+    assert all(f.severity == "warning" for f in found)

@@ -209,3 +209,41 @@ def test_what_cannot_be_is_said_clearly(folder, ask, error, words):
         ask(folder)
     assert words in str(caught.value)
     assert "--" not in str(caught.value)
+
+
+def test_one_measurement_need_not_be_in_a_list(folder, short):
+    imu, one = short
+    same(one, sd.navigate(imu, sd.Gnss(folder / "fixes.csv"), sensor=SENSOR))
+
+
+@pytest.mark.parametrize("changed", [False, True])
+def test_fixes_that_were_read_are_the_fixes_of_a_diagnosis(folder, tmp_path, changed):
+    """They are read as they were: by the options of their own, in memory if they changed."""
+    text = (folder / "fixes.csv").read_text().replace("lat", "breite", 1)
+    (tmp_path / "fixes.csv").write_text(text)
+    name = text.split(",")[1]
+    gnss = sd.read_gnss(tmp_path / "fixes.csv", columns={"lat": name})
+    if changed:
+        gnss = gnss.iloc[1:]
+    imu = sd.read_imu(folder / "drive.csv")
+    made = sd.doctor([imu, gnss], sampling="mean")
+    log, fixes = made.logs
+    assert log.data["fixes_from"] == fixes.name == ("fixes-2.csv" if changed else "fixes.csv")
+    found = log.streams["gnss"]
+    assert np.array_equal(found[["lat", "lon", "alt"]], gnss[["lat", "lon", "alt"]])
+    assert np.array_equal(found.index, gnss.index)
+    made.save(tmp_path / "out", report=False)
+    assert sd.verify(tmp_path / "out").verdict == "identical"
+    (alone,) = sd.doctor(gnss).logs
+    assert {*alone.streams} == {"gnss"}
+
+
+def test_a_diagnosis_takes_tables_of_other_libraries_and_no_dictionary(folder):
+    """Their columns were taken as logs, and the keys as names of files."""
+    polars = pytest.importorskip("polars")
+    imu = pd.DataFrame(sd.read_imu(folder / "drive.csv"))
+    imu.attrs = {}
+    (one,) = sd.doctor(polars.from_pandas(imu.reset_index())).logs
+    assert np.array_equal(one.streams["imu"].to_numpy(), imu.to_numpy())
+    with pytest.raises(ConfigError, check=coded("api.not-imu-samples", name="dict")):
+        sd.doctor(imu.to_dict("list"))

@@ -140,3 +140,86 @@ def test_warnings_stand_below_a_table():
     for shown in (repr(found), repr(found.head(1)), found._repr_html_()):
         assert "are usually in deg/s" in shown
     assert "warning" not in repr(sd.attitude(T, GYRO, ACCEL))
+
+
+# Tables for `read_imu` and `read_gnss`: rates that state their unit, of a body that turns.
+TABLE = BASE.add_suffix("_rad_s").rename(columns=lambda n: n.replace("accel", "acc")).assign(time=T)
+TABLE.columns = [n.replace("_rad_s", "_m_s2") if "acc" in n else n for n in TABLE.columns]
+WHOLE = sd.read_imu(TABLE, axes="x,y,z", sampling="instantaneous", units={"time": "s"})
+
+
+def same_as_whole(table, **units):
+    read = sd.read_imu(table, axes="x,y,z", sampling="instantaneous", units=units or None)
+    assert np.array_equal(read.to_numpy(), WHOLE.to_numpy())
+    assert read.index.to_numpy() == pytest.approx(T, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        pd.concat([TABLE[:200], TABLE[200:].reset_index(drop=True)]),
+        pd.concat([TABLE[:200], TABLE[200:].reset_index(drop=True)]).rename(
+            columns={"time": "stamp"}
+        ),
+        TABLE.set_index("time", drop=False),
+        TABLE.set_index(["time", "gyro_x_rad_s"], drop=False),
+        TABLE.astype(str),
+        TABLE.astype(object),
+    ],
+)
+def test_a_clock_among_the_columns_is_the_clock(table):
+    """An index of the same name, or of repeated numbers of rows, was a second one."""
+    same_as_whole(table, time="s")
+
+
+@pytest.mark.parametrize("to_objects", [False, True])
+def test_durations_of_a_table_to_be_read_are_seconds(to_objects):
+    """Without another answer: a unit was asked, or the column was left out."""
+    clock = pd.Series(pd.to_timedelta(T, unit="s"))
+    same_as_whole(TABLE.assign(time=clock.astype(object) if to_objects else clock))
+    same_as_whole(TABLE.drop(columns="time").set_index(pd.TimedeltaIndex(clock)))
+
+
+def test_a_text_among_numbers_is_a_row_that_is_refused_or_left_out():
+    table = TABLE.astype(str)
+    table.loc[7, "gyro_x_rad_s"] = "overflow"
+    with pytest.raises(DataError) as caught:
+        sd.read_imu(table, axes="x,y,z", units={"time": "s"})
+    assert caught.value.finding.row == 8
+    read = sd.read_imu(table, axes="x,y,z", units={"time": "s"}, repair=True)
+    assert len(read) == N - 1
+
+
+FIXES = pd.DataFrame({"time": T, "lat": 50.0 + 1e-6 * T, "lon": 30.0 + 0 * T, "alt": 100.0 + 0 * T})
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [
+        (lambda t: pd.concat([t, t.iloc[:, :1]], axis=1), "api.column-named-twice"),
+        (lambda t: t.set_axis([0, "0", *t.columns[2:]], axis=1), "api.column-named-twice"),
+        (lambda t: t[:0], "api.table-too-short"),
+        (lambda t: t[:1], "api.table-too-short"),
+        (lambda t: t.assign(note=[1, *["a"] * (N - 1)]), "api.not-numeric"),
+    ],
+)
+def test_a_table_that_cannot_be_read_is_refused(change, code):
+    """Each was an error of another package, or of a file."""
+    for read, table in ((sd.read_imu, TABLE), (sd.read_gnss, FIXES)):
+        with pytest.raises(DataError, check=coded(code)):
+            read(change(table))
+
+
+def test_a_column_twice_is_refused_by_every_door():
+    """The rates of a table with gyro_x twice were those of other columns."""
+    twice = pd.concat([BASE.assign(time=T), BASE[["gyro_x"]]], axis=1)
+    levels = twice.set_axis(
+        pd.MultiIndex.from_tuples(
+            [tuple(n.rsplit("_", 1)) if "_" in n else (n, "") for n in twice]
+        ),
+        axis=1,
+    )
+    for call in (sd.attitude, sd.doctor, sd.compare_attitude):
+        for table in (twice, levels):
+            with pytest.raises(DataError, check=coded("api.column-named-twice")):
+                call(table)
