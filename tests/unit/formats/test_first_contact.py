@@ -229,6 +229,7 @@ def test_a_sample_in_several_lines(tmp_path):
     check(imu, np.delete(RATE, 700, axis=0), np.delete(FORCE, 700, axis=0))
 
 
+G = STANDARD_GRAVITY
 #: What a program prints of a sample: t in s, w in deg/s, f in m/s².
 PRINTED = {
     "stamp with a unit": "{ms:.0f} ms  ax: {f[0]:.6f} ay: {f[1]:.6f} az: {f[2]:.6f} "
@@ -239,6 +240,16 @@ PRINTED = {
     "{f[1]:.6f}, {f[2]:.6f}) m/s^2 t={t:.3f}",
     "line protocol": "imu,host=pi ax={f[0]:.6f},ay={f[1]:.6f},az={f[2]:.6f},gx_dps={w[0]:.5f},"
     "gy_dps={w[1]:.5f},gz_dps={w[2]:.5f} {ns:.0f}",
+    "log of another framework": "[{clock},{us:03.0f}] <inf> main: accel x:{f[0]:.6f} y:{f[1]:.6f} "
+    "z:{f[2]:.6f} (m/s^2)\n[{clock},{us:03.0f}] <inf> main: gyro x:{r[0]:.7f} y:{r[1]:.7f} "
+    "z:{r[2]:.7f} (rad/s)",
+    "bars": "{t:.2f}s | gx {w[0]:.5f}°/s | gy {w[1]:.5f}°/s | gz {w[2]:.5f}°/s | ax {g[0]:.7f}g | "
+    "ay {g[1]:.7f}g | az {g[2]:.7f}g",
+    "lines in turn": "{t:.4f} accelerometer: x={f[0]:.6f} y={f[1]:.6f} z={f[2]:.6f}\n"
+    "{t:.4f} gyroscope: x={r[0]:.7f} y={r[1]:.7f} z={r[2]:.7f}",
+    "numpy": "{{'t': np.float64({t:.3f}), 'acc': {{'x': np.float64({f[0]:.6f}), 'y': "
+    "np.float64({f[1]:.6f}), 'z': np.float64({f[2]:.6f})}}, 'gyro': {{'x': np.float64({r[0]:.7f}), "
+    "'y': np.float64({r[1]:.7f}), 'z': np.float64({r[2]:.7f})}}}}",
     "dictionary": "{{'t': {t:.3f}, 'accel': {{'x': {f[0]:.6f}, 'y': {f[1]:.6f}, 'z': {f[2]:.6f}}}, "
     "'gyro (deg/s)': {{'x': {w[0]:.5f}, 'y': {w[1]:.5f}, 'z': {w[2]:.5f}}}}}",
     "message in lines": "header:\n  stamp:\n    sec: {s:.0f}\n    nanosec: {rest:.0f}\n"
@@ -254,7 +265,10 @@ def test_lines_as_programs_print_them(tmp_path, form):
     for k in range(N):
         ns = 1_709_640_000_000_000_000 + round(1e9 * T[k])
         numbers = {"t": T[k], "ms": 1e3 * T[k], "ns": ns, "s": ns // 10**9, "rest": ns % 10**9}
-        rows.append(PRINTED[form].format(**numbers, w=RATE[k] * DEG, r=RATE[k], f=FORCE[k]))
+        day = DAY + timedelta(milliseconds=round(1e3 * T[k]))
+        numbers |= {"clock": f"{day:%H:%M:%S}.{day.microsecond // 1000:03d}", "us": 0}
+        sensors = {"w": RATE[k] * DEG, "r": RATE[k], "f": FORCE[k], "g": FORCE[k] / G}
+        rows.append(PRINTED[form].format(**numbers, **sensors))
     check(sd.read_imu(written(tmp_path, "capture.log", rows)))
 
 
@@ -269,6 +283,17 @@ def test_lines_as_programs_print_them(tmp_path, form):
 def test_printed_lines_that_may_be_read_in_two_ways_are_not(form):
     lines = [(k, form.format(t=0.01 * k, a=0.3 + 0.01 * k, k=k)) for k in range(20)]
     assert csv._unlabelled(lines) is lines
+
+
+def test_the_clock_of_lines_in_turn_is_that_of_the_gyro(tmp_path):
+    rows = []
+    for k in range(N):
+        rows.append(
+            "{:.4f} accelerometer: x={:.6f} y={:.6f} z={:.6f}".format(T[k] - 0.003, *FORCE[k])
+        )
+        rows.append("{:.4f} gyroscope: x={:.7f} y={:.7f} z={:.7f}".format(T[k], *RATE[k]))
+    imu = sd.read_imu(written(tmp_path, "turns.log", rows))
+    np.testing.assert_allclose(imu.index, T, atol=1e-9)
 
 
 def by_axis(rows, digits=7):
