@@ -480,6 +480,9 @@ def _names(texts: tuple[str, ...], rows: list[list[str]]) -> list[str] | None:
         elif len(run) == 2 and re.sub(r"\W", "", name).lower() in _POSITIONS:
             names += ["lat", "lon"]
             continue
+        elif len(run) == 6 and name.lower() == "a/g":  # as an example for MPU-6050 prints them
+            names += [f"{sensor}_{axis}" for sensor in ("accel", "gyro") for axis in "xyz"]
+            continue
         elif name in _LEVELS and texts[run[0]].endswith("("):
             name, unit = LEADING, unit or "ms"
         ends = [""] if len(run) == 1 else " x, y, z" if len(run) == 3 else map(str, range(len(run)))

@@ -247,6 +247,8 @@ PRINTED = {
     "ay {g[1]:.7f}g | az {g[2]:.7f}g",
     "lines in turn": "{t:.4f} accelerometer: x={f[0]:.6f} y={f[1]:.6f} z={f[2]:.6f}\n"
     "{t:.4f} gyroscope: x={r[0]:.7f} y={r[1]:.7f} z={r[2]:.7f}",
+    "log of a phone": "03-05 {clock}  1234  1250 D App: TYPE_GYROSCOPE x={r[0]:.7f} y={r[1]:.7f} "
+    "z={r[2]:.7f} TYPE_ACCELEROMETER x={f[0]:.6f} y={f[1]:.6f} z={f[2]:.6f}",
     "numpy": "{{'t': np.float64({t:.3f}), 'acc': {{'x': np.float64({f[0]:.6f}), 'y': "
     "np.float64({f[1]:.6f}), 'z': np.float64({f[2]:.6f})}}, 'gyro': {{'x': np.float64({r[0]:.7f}), "
     "'y': np.float64({r[1]:.7f}), 'z': np.float64({r[2]:.7f})}}}}",
@@ -285,6 +287,22 @@ def test_printed_lines_that_may_be_read_in_two_ways_are_not(form):
     assert csv._unlabelled(lines) is lines
 
 
+def test_columns_of_a_sensor_are_members_of_it(tmp_path):
+    members = {"time": T.tolist()}
+    for name, values, unit in (("gyro", RATE * DEG, "deg/s"), ("accelerometer", FORCE, "m/s2")):
+        members[name] = {a: values[:, k].tolist() for k, a in enumerate("xyz")} | {"unit": unit}
+    check(sd.read_imu(written(tmp_path, "log.json", [json.dumps(members)])))
+
+
+def test_six_numbers_of_one_label(tmp_path):
+    """The example for MPU-6050 that most copies begin with: accelerations before rates."""
+    counts = np.rint(np.column_stack([FORCE / G * 16384, RATE * DEG * 131])).astype(int)
+    rows = ["a/g:\t" + "\t".join(map(str, row)) for row in counts.tolist()]
+    units = {"accel": "g/16384", "gyro": "deg/s/131"}
+    imu = sd.read_imu(written(tmp_path, "mpu.log", rows), rate_hz=100.0, units=units)
+    check(imu, digits=1e-4)
+
+
 def test_the_clock_of_lines_in_turn_is_that_of_the_gyro(tmp_path):
     rows = []
     for k in range(N):
@@ -300,7 +318,7 @@ def by_axis(rows, digits=7):
     return [dict(zip("xyz", (round(float(v), digits) for v in row), strict=True)) for row in rows]
 
 
-@pytest.mark.parametrize("kind", ["apart", "together", "columns"])
+@pytest.mark.parametrize("kind", ["apart", "together", "columns", "rows"])
 def test_blocks_of_samples_under_one_stamp(tmp_path, kind):
     """A sensor on a belt (Movesense), and a watch (Garmin): a list of samples a stamp."""
     many_at, records, rate = 5, [], RATE * DEG
@@ -313,13 +331,17 @@ def test_blocks_of_samples_under_one_stamp(tmp_path, kind):
         elif kind == "together":
             both = {"Timestamp": stamp, "ArrayAcc": acc, "ArrayGyro": gyro}
             records.append({"imu6": both})
+        elif kind == "rows":
+            gyro, acc = rate[part].round(7).tolist(), FORCE[part].round(7).tolist()
+            records.append({"timestamp": stamp, "gyro": gyro, "accel": acc})
         else:
             columns = {a: [one[a] for one in acc] for a in "xyz"}
             turns = {a: [one[a] for one in gyro] for a in "xyz"}
             records.append({"timestamp": stamp, "accelerometer": columns, "gyroscope": turns})
     if kind == "apart":
         del records[2 * 100 : 2 * 110]  # a gap does not stretch the block before it
-    path = written(tmp_path, "blocks.json", [json.dumps({"data": records})])
+    about = {"device": "X", "units": {"gyro": "deg/s"}} if kind == "rows" else {}
+    path = written(tmp_path, "blocks.json", [json.dumps({**about, "data": records})])
     imu = sd.read_imu(path)
     assert "io.stamps-of-blocks" in {f.code for f in imu.findings}
     if kind == "apart":
