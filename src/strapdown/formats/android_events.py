@@ -128,7 +128,9 @@ def _layout(text: str) -> tuple[int, int, int, str | None, dict[str, str]] | Non
     # A kind may be behind two clocks.
     orders = ((0, 1, 2), (1, 0, 2), (2, 0, 3))
     body = [r for r in rows[1:-1] if len(r) >= 5]
-    if len(body) < 0.9 * (len(rows) - 2):
+    # Values with labels, x=0.01, are those of printed lines.
+    plain = csv.are_data([field for row in body for field in row[2:5]])
+    if len(body) < 0.9 * (len(rows) - 2) or not plain:
         return None
     for kind, stamp, first in orders[: 3 if body and len(body[0]) > 5 else 2]:
         # A counter of samples takes every number once, a kind of sensor returns.

@@ -282,14 +282,23 @@ _TAGGED = re.compile(r"\s*([A-Za-z]\w*):[ \t]*(?=[+-]?[\d.][^:=]*$)")
 # a part of the word before it.
 _UNSIGNED = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _PRINTED = re.compile(
-    r"(?<![\w.])(?:\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?(?:Z|[+-]\d\d:?\d\d)?(?![\w:])"
-    rf"|(?<![\w.^])[+-]{_UNSIGNED}|(?<![\w.^+-]){_UNSIGNED}|(?<!\w)[+-]?(?:nan|inf)(?!\w)",
+    r"(?<![\w.])(?:(?:\d{4}-\d\d-\d\d|\d{1,2}/\d{1,2}/\d{4})[ T])?\d{1,2}:\d\d:\d\d"
+    r"(?:[.,]\d+(?:,\d{3})?)?(?:Z|[+-]\d\d:?\d\d)?(?![\w:])"
+    rf"|(?<![\w.^])[+-]{_UNSIGNED}|(?<![\w.^+-]){_UNSIGNED}|(?<![\w<])[+-]?(?:nan|inf)(?![\w>])",
     re.I,
 )
 # Signs between the values of a vector, at the end of a label, and between its words.
 _BETWEEN = re.compile(r"[,;/| \t-]+")
-_LABEL = re.compile(r"[^\W\d_].*[:=]\s*[\[({<]?$|[^\W\d_].*[\[({<]$", re.S)
-_MARKS_OF_PRINT = re.compile(r"([:=\[\](){}<>,;|]|\s-\s)")
+_LABEL = re.compile(r"[^\W\d_].*[:=]\s*[\[({<]?$|[^\W\d_].*[\[({<]$|[|,;]\s*[A-Za-z][\w ]*$", re.S)
+# A number as numpy prints it within a dictionary.
+_TYPE = re.compile(r"\b(?:np|numpy)\.\w+\($")
+#: Labels of a latitude and a longitude.
+_POSITIONS = {"location", "position", "gps", "coordinates", "coords", "latlng", "latlon"}
+# A unit in brackets behind a value.
+_BEHIND = re.compile(r"\s*[\[(]([^\[\]()]*(?:\([^()]*\))?[^\[\]()]*)[\])]")
+#: Between the lines of a sample that are joined.
+_NEXT_LINE = " ~ "
+_MARKS_OF_PRINT = re.compile(r"([:=\[\](){}<>,;|~]|\s-\s)")
 _CLOSED = re.compile(r"[\])}>\s]*")
 _FIRST_WORD = re.compile(r"([^\s,;|:=\[\](){}<>]+)(.*)", re.S)
 _TRIMMED = " \t'\"*#>-"
@@ -359,7 +368,7 @@ def _printed(line: str) -> Printed:
     texts, values, end = [], [], 0
     for m in _PRINTED.finditer(line) if len(line) < LONGEST else ():
         texts.append(line[end : m.start()])
-        values.append(m[0])
+        values.append(re.sub(r"(:\d\d\.\d{3}),(\d{3})$", r"\1\2", m[0]))  # 09:59:58.123,456
         end = m.end()
     texts.append(line[end:])
     return tuple(" ".join(text.split()) or text[:1] for text in texts), values
@@ -389,7 +398,7 @@ def _one_line_a_sample(numbered: Lines) -> Lines:
         if key == turns[len(sample)]:
             sample.append((row, line.strip()))
         if len(sample) == period:
-            out.append((sample[0][0], "; ".join(said for _, said in sample)))
+            out.append((sample[0][0], _NEXT_LINE.join(said for _, said in sample)))
     return out
 
 
@@ -450,20 +459,32 @@ def _names(texts: tuple[str, ...], rows: list[list[str]]) -> list[str] | None:
                 break
             said[k] = (said[k][0], unit)
         # 0,12 may be a number with a decimal comma.
-        if len(run) % 2 == 0 and texts[run[1]] == ",":
+        pointed = any("." in row[k] for row in rows for k in run if k < len(row))
+        if len(run) % 2 == 0 and texts[run[1]] == "," and not pointed:
             return None
         inside, own = split_brackets(label)
         said.append((inside.strip(), own))
         bases.append(base)
     del said[-1]
     timed = any(read_name(name).quantity == "time" for name, _ in said)
+    clocks = [
+        j for j, run in enumerate(runs) if not said[j][0] and _is_clock([r[run[0]] for r in rows])
+    ]
+    # Of several, as of lines that each have one, that of the gyro.
+    gyro = next((j for j, (name, _) in enumerate(said) if _is_turn(name)), len(runs))
+    clock = next((j for j in reversed(clocks) if j < gyro), clocks[0] if clocks else -1)
     names: list[str] = []
-    for run, (name, unit) in zip(runs, said, strict=True):
+    for j, (run, (name, unit)) in enumerate(zip(runs, said, strict=True)):
         if not name:
-            name = COUNTED if timed or not _is_clock([row[run[0]] for row in rows]) else LEADING
-            timed = timed or name == LEADING
+            name = LEADING if j == clock and not timed else COUNTED
+        elif len(run) == 2 and re.sub(r"\W", "", name).lower() in _POSITIONS:
+            names += ["lat", "lon"]
+            continue
+        elif len(run) == 6 and name.lower() == "a/g":  # as an example for MPU-6050 prints them
+            names += [f"{sensor}_{axis}" for sensor in ("accel", "gyro") for axis in "xyz"]
+            continue
         elif name in _LEVELS and texts[run[0]].endswith("("):
-            name, unit, timed = LEADING, unit or "ms", True
+            name, unit = LEADING, unit or "ms"
         ends = [""] if len(run) == 1 else " x, y, z" if len(run) == 3 else map(str, range(len(run)))
         for end in ends.split(",") if isinstance(ends, str) else ends:
             names.append(f"{name} {end.strip()}".strip() + (f" [{unit}]" if unit else ""))
@@ -476,7 +497,9 @@ def _label(text: str, base: str) -> tuple[str, str, str]:
     `base`: of the label before, which an axis alone continues: ``Accel X: 1, Y: 2``.
     """
     unit = ""
-    text = text[_CLOSED.match(text).end() :]  # type: ignore[union-attr]
+    text = _TYPE.sub("", text[_CLOSED.match(text).end() :])  # type: ignore[union-attr]
+    if (m := _BEHIND.match(text)) and (found := unit_of(m[1])) is not None:
+        unit, text = found, text[m.end() :]
     # A label of one letter may be spelled as a unit: then it is next to the number.
     m = _FIRST_WORD.match(text)
     found = unit_of(m[1]) if m else None
@@ -506,6 +529,11 @@ def _label(text: str, base: str) -> tuple[str, str, str]:
     else:
         base = label
     return unit, f"{label} [{own}]" if own else label, base
+
+
+def _is_turn(name: str) -> bool:
+    """Whether a label is of a gyro, alone or with an axis."""
+    return any(str(read_name(n).quantity).startswith("gyro") for n in (name, f"{name} x"))
 
 
 def _is_clock(values: list[str]) -> bool:

@@ -152,7 +152,9 @@ LONG_BLOCK = 1.5
 #: format): ``"sensors": [{"name": "accX", "units": "m/s2"}, …], "values": [[…], …]``.
 _APART = re.compile(r'"sensors"\s*:\s*\[\s*\{[^\[\]]*\}\s*\]\s*,\s*"values"\s*:\s*\[')
 #: An object of which one member is the list of the objects: ``{"locations": [{…``.
-_MEMBER = re.compile(r'\{\s*(?:"\w+"\s*:\s*(?:"[^"]*"|[-\w.]+)\s*,\s*)*"\w+"\s*:\s*\[\s*\{')
+_MEMBER = re.compile(
+    r'\{\s*(?:"\w+"\s*:\s*(?:"[^"]*"|[-\w.]+|\{[^{}\[\]]*\})\s*,\s*)*"\w+"\s*:\s*\[\s*\{'
+)
 
 
 #: An object whose members are columns: ``{"time": [0.0, …``, or as pandas writes a table.
@@ -275,6 +277,15 @@ def _by_columns(path: Path) -> RawLog:
 
 def _of_columns(path: Path, content: Any) -> RawLog:
     held = content if isinstance(content, dict) else {"rows": content}
+    # Columns of a sensor are members of it: {"time": […], "gyro": {"x": […], …}}.
+    units: dict[str, str] = {}
+    for name, inner in list(held.items()):
+        lists = inner if isinstance(inner, dict) else {}
+        lists = {f"{name}.{n}": v for n, v in lists.items() if isinstance(v, list)}
+        if lists:
+            held = {n: v for n, v in held.items() if n != name} | lists
+            unit = next((str(inner[n]) for n in ("unit", "units") if n in inner), None)
+            units |= dict.fromkeys(lists, unit) if unit else {}
     tables = [v for v in held.values() if isinstance(v, list) and v and isinstance(v[0], list)]
     if len(tables) == 1 and len(tables[0][0]) > 3:
         rows, width = [row for row in tables[0] if isinstance(row, list)], len(tables[0][0])
@@ -363,9 +374,12 @@ def _of_blocks(objects: list[dict[str, Any]]) -> Blocks:
         sensors: dict[str, list[list[Any]]] = {}
         for name, value in held.items():
             axes = value[0] if isinstance(value, list) and value else value
-            if not isinstance(axes, dict) or not {*"xyz"} <= axes.keys():
+            rows = isinstance(axes, list) and len(axes) == len("xyz")
+            if not rows and not (isinstance(axes, dict) and {*"xyz"} <= axes.keys()):
                 continue
-            if value is axes:
+            if rows:
+                columns = [[v[k] for v in value if len(v) == len("xyz")] for k in range(3)]
+            elif value is axes:
                 columns = [value[a] if isinstance(value[a], list) else [] for a in "xyz"]
             else:
                 columns = [[v.get(a) for v in value if isinstance(v, dict)] for a in "xyz"]

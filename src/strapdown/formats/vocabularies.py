@@ -229,7 +229,7 @@ NOISE = {
     *("ins", "the", "of", "in", "de", "del", "di", "reading", "readings", "uncal", "uncalibrated"),
     # Of flight controllers: converted, smoothed (gyroADC, accSmooth).
     *("adc", "smooth", "filt", "filtered", "lpf", "lowpass", "out", "scaled", "total", "inertial"),
-    *("uncomp", "uncompensated", "comp", "compensated", "ch", "channel", "sens", "mpu"),
+    *("uncomp", "uncompensated", "comp", "compensated", "ch", "channel", "sens", "mpu", "type"),
     # Counts, and revolutions or radians per second: the values say which.
     *("lsb", "rps", "轴", "軸", "축", "ось", "оси"),
 }

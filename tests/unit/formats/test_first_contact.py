@@ -229,6 +229,7 @@ def test_a_sample_in_several_lines(tmp_path):
     check(imu, np.delete(RATE, 700, axis=0), np.delete(FORCE, 700, axis=0))
 
 
+G = STANDARD_GRAVITY
 #: What a program prints of a sample: t in s, w in deg/s, f in m/s².
 PRINTED = {
     "stamp with a unit": "{ms:.0f} ms  ax: {f[0]:.6f} ay: {f[1]:.6f} az: {f[2]:.6f} "
@@ -239,6 +240,18 @@ PRINTED = {
     "{f[1]:.6f}, {f[2]:.6f}) m/s^2 t={t:.3f}",
     "line protocol": "imu,host=pi ax={f[0]:.6f},ay={f[1]:.6f},az={f[2]:.6f},gx_dps={w[0]:.5f},"
     "gy_dps={w[1]:.5f},gz_dps={w[2]:.5f} {ns:.0f}",
+    "log of another framework": "[{clock},{us:03.0f}] <inf> main: accel x:{f[0]:.6f} y:{f[1]:.6f} "
+    "z:{f[2]:.6f} (m/s^2)\n[{clock},{us:03.0f}] <inf> main: gyro x:{r[0]:.7f} y:{r[1]:.7f} "
+    "z:{r[2]:.7f} (rad/s)",
+    "bars": "{t:.2f}s | gx {w[0]:.5f}°/s | gy {w[1]:.5f}°/s | gz {w[2]:.5f}°/s | ax {g[0]:.7f}g | "
+    "ay {g[1]:.7f}g | az {g[2]:.7f}g",
+    "lines in turn": "{t:.4f} accelerometer: x={f[0]:.6f} y={f[1]:.6f} z={f[2]:.6f}\n"
+    "{t:.4f} gyroscope: x={r[0]:.7f} y={r[1]:.7f} z={r[2]:.7f}",
+    "log of a phone": "03-05 {clock}  1234  1250 D App: TYPE_GYROSCOPE x={r[0]:.7f} y={r[1]:.7f} "
+    "z={r[2]:.7f} TYPE_ACCELEROMETER x={f[0]:.6f} y={f[1]:.6f} z={f[2]:.6f}",
+    "numpy": "{{'t': np.float64({t:.3f}), 'acc': {{'x': np.float64({f[0]:.6f}), 'y': "
+    "np.float64({f[1]:.6f}), 'z': np.float64({f[2]:.6f})}}, 'gyro': {{'x': np.float64({r[0]:.7f}), "
+    "'y': np.float64({r[1]:.7f}), 'z': np.float64({r[2]:.7f})}}}}",
     "dictionary": "{{'t': {t:.3f}, 'accel': {{'x': {f[0]:.6f}, 'y': {f[1]:.6f}, 'z': {f[2]:.6f}}}, "
     "'gyro (deg/s)': {{'x': {w[0]:.5f}, 'y': {w[1]:.5f}, 'z': {w[2]:.5f}}}}}",
     "message in lines": "header:\n  stamp:\n    sec: {s:.0f}\n    nanosec: {rest:.0f}\n"
@@ -254,7 +267,10 @@ def test_lines_as_programs_print_them(tmp_path, form):
     for k in range(N):
         ns = 1_709_640_000_000_000_000 + round(1e9 * T[k])
         numbers = {"t": T[k], "ms": 1e3 * T[k], "ns": ns, "s": ns // 10**9, "rest": ns % 10**9}
-        rows.append(PRINTED[form].format(**numbers, w=RATE[k] * DEG, r=RATE[k], f=FORCE[k]))
+        day = DAY + timedelta(milliseconds=round(1e3 * T[k]))
+        numbers |= {"clock": f"{day:%H:%M:%S}.{day.microsecond // 1000:03d}", "us": 0}
+        sensors = {"w": RATE[k] * DEG, "r": RATE[k], "f": FORCE[k], "g": FORCE[k] / G}
+        rows.append(PRINTED[form].format(**numbers, **sensors))
     check(sd.read_imu(written(tmp_path, "capture.log", rows)))
 
 
@@ -271,11 +287,38 @@ def test_printed_lines_that_may_be_read_in_two_ways_are_not(form):
     assert csv._unlabelled(lines) is lines
 
 
+def test_columns_of_a_sensor_are_members_of_it(tmp_path):
+    members = {"time": T.tolist()}
+    for name, values, unit in (("gyro", RATE * DEG, "deg/s"), ("accelerometer", FORCE, "m/s2")):
+        members[name] = {a: values[:, k].tolist() for k, a in enumerate("xyz")} | {"unit": unit}
+    check(sd.read_imu(written(tmp_path, "log.json", [json.dumps(members)])))
+
+
+def test_six_numbers_of_one_label(tmp_path):
+    """The example for MPU-6050 that most copies begin with: accelerations before rates."""
+    counts = np.rint(np.column_stack([FORCE / G * 16384, RATE * DEG * 131])).astype(int)
+    rows = ["a/g:\t" + "\t".join(map(str, row)) for row in counts.tolist()]
+    units = {"accel": "g/16384", "gyro": "deg/s/131"}
+    imu = sd.read_imu(written(tmp_path, "mpu.log", rows), rate_hz=100.0, units=units)
+    check(imu, digits=1e-4)
+
+
+def test_the_clock_of_lines_in_turn_is_that_of_the_gyro(tmp_path):
+    rows = []
+    for k in range(N):
+        rows.append(
+            "{:.4f} accelerometer: x={:.6f} y={:.6f} z={:.6f}".format(T[k] - 0.003, *FORCE[k])
+        )
+        rows.append("{:.4f} gyroscope: x={:.7f} y={:.7f} z={:.7f}".format(T[k], *RATE[k]))
+    imu = sd.read_imu(written(tmp_path, "turns.log", rows))
+    np.testing.assert_allclose(imu.index, T, atol=1e-9)
+
+
 def by_axis(rows, digits=7):
     return [dict(zip("xyz", (round(float(v), digits) for v in row), strict=True)) for row in rows]
 
 
-@pytest.mark.parametrize("kind", ["apart", "together", "columns"])
+@pytest.mark.parametrize("kind", ["apart", "together", "columns", "rows"])
 def test_blocks_of_samples_under_one_stamp(tmp_path, kind):
     """A sensor on a belt (Movesense), and a watch (Garmin): a list of samples a stamp."""
     many_at, records, rate = 5, [], RATE * DEG
@@ -288,13 +331,17 @@ def test_blocks_of_samples_under_one_stamp(tmp_path, kind):
         elif kind == "together":
             both = {"Timestamp": stamp, "ArrayAcc": acc, "ArrayGyro": gyro}
             records.append({"imu6": both})
+        elif kind == "rows":
+            gyro, acc = rate[part].round(7).tolist(), FORCE[part].round(7).tolist()
+            records.append({"timestamp": stamp, "gyro": gyro, "accel": acc})
         else:
             columns = {a: [one[a] for one in acc] for a in "xyz"}
             turns = {a: [one[a] for one in gyro] for a in "xyz"}
             records.append({"timestamp": stamp, "accelerometer": columns, "gyroscope": turns})
     if kind == "apart":
         del records[2 * 100 : 2 * 110]  # a gap does not stretch the block before it
-    path = written(tmp_path, "blocks.json", [json.dumps({"data": records})])
+    about = {"device": "X", "units": {"gyro": "deg/s"}} if kind == "rows" else {}
+    path = written(tmp_path, "blocks.json", [json.dumps({**about, "data": records})])
     imu = sd.read_imu(path)
     assert "io.stamps-of-blocks" in {f.code for f in imu.findings}
     if kind == "apart":
