@@ -76,6 +76,7 @@ from strapdown.orientation_filters import is_filter
 from strapdown.progress import Progress, silent
 from strapdown.sensors.rest import (
     RestStretch,
+    begins_at_rest,
     could_be_a_turn,
     field_turned,
     find_rests,
@@ -673,7 +674,8 @@ def initial_attitude(
     name = imu.attrs.get("source")
     stamps = imu.index.to_numpy(dtype=np.float64)
     begin = float(stamps[0])
-    at_rest = bool(rests) and rests[0].start - begin <= 1.0 and rests[0].accel_mean is not None
+    first = begins_at_rest(rests, begin)
+    at_rest = first is not None and first.accel_mean is not None
     choice = text.strip().lower()
     how = {"truth": "from the truth", "level": "levelled; heading zero", "zero": "zero"}
     if choice == "auto":
@@ -698,13 +700,13 @@ def initial_attitude(
             )
         q_nb, begin = known.q_nb[good[0]], float(stamps[good[0]])
     elif choice == "level":
-        if not at_rest or rests[0].accel_mean is None:
+        if first is None or first.accel_mean is None:
             raise ConfigError(
                 "attitude.levelling-needs-accelerometer-log-begins",
                 file=name,
                 quantity="--initial",
             )
-        tilt = rotation.level(rests[0].accel_mean)
+        tilt = rotation.level(first.accel_mean)
         if abs(tilt[0]) > 90.0:
             code = "attitude.levelled-upside-down-roll"
             findings.append(Finding(code, file=name, quantity="accel", roll=tilt[0]))

@@ -38,7 +38,7 @@ from strapdown.formats.find_columns import (
     unit_stated,
     without_gyro,
 )
-from strapdown.formats.inference.conclusion import infer_accel
+from strapdown.formats.inference.conclusion import infer_accel, infer_time_unit
 from strapdown.formats.join import join
 from strapdown.formats.recording import (
     AXES_OF_SENSOR,
@@ -149,6 +149,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
             best = choices[0].data
             unit = str(best["unit"]) if best["share"] >= LIKELY else "UNIT"
             questions.ask(error.finding, time_unit=unit)
+        elif code == "io.time-unit-named-too-fast":
+            questions.ask(error.finding, time_unit=str(error.finding.data["likely"]))
         elif code == "io.time-column-missing":
             name = _likely_clock(raw, found)
             questions.ask(error.finding, **({"time": name} if name else {"rate": "HZ"}))
@@ -419,6 +421,8 @@ def _repair(fault: Finding, count: int) -> dict[str, str]:
 #: Longest usual step of a log with a gyro, s. Between samples that are farther apart any turn may
 #: be hidden; such rows are of another sensor's rate, or of another unit of time.
 SLOWEST = 2.0
+#: Rate up to which the name of a clock is believed against its steps, Hz: crash units take 20 kHz.
+FASTEST = 21e3
 
 
 def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
@@ -701,9 +705,38 @@ def _stamps_of_log(
         if unit != "s":
             said = inferred.finding("io.time-unit-inferred", file=raw.name, quantity="time")
             log.findings.append(said)
-    stamps = read_stamps(ticks if rows is None else ticks[rows], unit, why, **where)
+    ticks = ticks if rows is None else ticks[rows]
+    if unit == column.unit and not (dated or options.time_unit) and column.basis != "file":
+        _check_named_step(log, ticks)
+    stamps = read_stamps(ticks, unit, why, **where)
     log.findings += stamps.findings
     return stamps
+
+
+def _check_named_step(log: LogInUse, ticks: NDArray[Any]) -> None:
+    """Ask for the unit of time where the named one makes a rate that inertial sensors have not.
+
+    DataError: and the steps by themselves are of another unit.
+    """
+    column = log.found["time"]
+    if column.unit is None or ticks.size < 3:
+        return
+    step = float(ticks[-1] - ticks[0]) / (ticks.size - 1)
+    if step <= 0.0 or (rate := 1.0 / (step * factor_of(column.unit, TIME_UNITS))) <= FASTEST:
+        return
+    likely = infer_time_unit(ticks)
+    if likely.settled and likely.value not in (None, column.unit):
+        unit = str(likely.value)
+        raise log.raw.fault(
+            "io.time-unit-named-too-fast",
+            "time",
+            source=column.source,
+            unit=column.unit,
+            step=step,
+            rate_hz=rate,
+            likely=unit,
+            likely_hz=1.0 / (step * factor_of(unit, TIME_UNITS)),
+        )
 
 
 def _clock_of_log(log: LogInUse, stamps: Stamps, dated: bool, sample: int) -> tuple[Clock, Reading]:

@@ -148,6 +148,11 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     return of_one_bias([_stretch(time, gyro, accel, *rows) for rows in _runs_of(time, gyro, accel)])
 
 
+def begins_at_rest(rests: Sequence[RestStretch], begin: float) -> RestStretch | None:
+    """Return the rest that levels a log: the first, if it begins within a second of `begin`, s."""
+    return rests[0] if rests and rests[0].start - begin <= 1.0 else None
+
+
 def find_rest_spans(imu: pd.DataFrame) -> tuple[tuple[float, float], ...]:
     """Begin and end, s, of the rests of `find_rests`, without the statistics of each."""
     time, gyro, accel = _signals(imu)

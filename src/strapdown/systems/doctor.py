@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown import rotation
 from strapdown.bundle import InputFiles, Seal, log_files
 from strapdown.config.logs import (
     AxesTable,
@@ -54,6 +55,7 @@ from strapdown.sensors.imu_health import ImuHealth, check_imu_channels
 from strapdown.sensors.rest import (
     LEAST_LENGTH,
     RestStretch,
+    begins_at_rest,
     could_be_a_turn,
     field_turned,
     find_rests_of_every_grade,
@@ -896,7 +898,15 @@ def _attitude(one: LogDiagnosis) -> list[Finding]:
         found.append(said)
     gravity = one.data["gravity"]
     if gravity is not None and gravity["included"]:
-        found.append(Finding("doctor.levels-by-gravity", severity="note", file=one.name))
+        said = Finding("doctor.levels-by-gravity", severity="note", file=one.name)
+        still = [rest for rest in one.rests if rest.grade == "still"]
+        start = begins_at_rest(still, index_of(imu)[0])
+        if start is not None and start.accel_mean is not None and "reference" not in one.streams:
+            try:
+                rotation.level(start.accel_mean)
+            except DataError as error:
+                said = error.finding.replace(file=one.name)
+        found.append(said)
     else:
         found.append(_without_force(one, "doctor.no-leveling", "warning"))
     found.append(_bias(one))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from tests.coded import coded
 
 import strapdown as sd
 from strapdown.errors import DataError
 from strapdown.formats import ReadOptions, read_log
+
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 
 
 def table(path, names, rows):
@@ -48,6 +51,36 @@ def test_a_gyro_that_is_too_slow_is_refused_unless_the_unit_is_stated(tmp_path, 
         read_log(path)
     assert len(read_log(path, ReadOptions(time_unit="s")).imu) == 12
     assert len(read_log(path, ReadOptions(time_unit="ms")).imu) == 12
+
+
+@pytest.mark.parametrize(
+    ("unit", "step", "likely"),
+    [
+        ("ms", 0.01, "s"),
+        ("ms", 0.04, "s"),
+        ("us", 0.01, "s"),
+        ("us", 10, "ms"),
+        ("ms", 0.05, None),  # 20 kHz, as of a crash unit
+        ("ms", 10, None),
+        ("us", 125, None),
+        ("s", 0.01, None),
+    ],
+)
+def test_a_clock_named_in_a_unit_of_no_such_sensor_is_asked_about(tmp_path, unit, step, likely):
+    """Seconds under the name of milliseconds are 100 kHz at 100 Hz."""
+    rng = np.random.default_rng(3)
+    names = f"time_{unit},gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s"
+    rows = [[round(step * k, 3), *rng.normal(0.0, 0.01, 3).round(5).tolist()] for k in range(3000)]
+    path = table(tmp_path / "a.csv", names, rows)
+    if likely is None:
+        assert read_log(path).imu.index[-1] == pytest.approx(2999 * step * SECONDS[unit])
+        return
+    with pytest.raises(DataError, check=coded("io.time-unit-named-too-fast")) as error:
+        read_log(path)
+    assert error.value.finding.data["likely"] == likely
+    for stated in (likely, unit):
+        end = read_log(path, ReadOptions(time_unit=stated)).imu.index[-1]
+        assert end == pytest.approx(2999 * step * SECONDS[stated])
 
 
 def test_a_stream_that_cannot_be_read_is_named(tmp_path, recordings):

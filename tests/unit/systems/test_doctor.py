@@ -454,6 +454,22 @@ def test_a_log_whose_gyro_is_constant_on_one_axis_has_no_attitude(sound, tmp_pat
         assert (lost.quantity, lost.data["percent"]) == ("gyro_y", 100.0)
 
 
+@pytest.mark.parametrize(("scale", "refused"), [(0.79, True), (0.85, False)])
+def test_a_force_at_rest_that_levels_no_attitude_is_said(sound, tmp_path, scale, refused):
+    """One axis of another scale: what `attitude` refuses, the doctor does not propose."""
+    table = sound.assign(**{ACCELS[2]: scale * sound[ACCELS[2]]})
+    path = written(table, tmp_path / "log.csv")
+    (one,) = sd.doctor(path).logs
+    said = {f.code for f in one.fit["attitude"] if f.severity == "error"}
+    code = "alignment.levelling-force-not-gravity"
+    assert (code in said) == refused
+    if refused:
+        with pytest.raises(DataError, check=coded(code)):
+            sd.attitude(path)
+    else:
+        sd.attitude(path)
+
+
 def test_an_axis_that_is_stuck_for_a_while_limits_the_attitude(sound, tmp_path):
     table = sound.copy()
     table.loc[3000:3799, "gyro_z_rad_s"] = table.gyro_z_rad_s[3000]

@@ -36,8 +36,12 @@ MOVES = 1.0
 #: residuals, in standard deviations by the median, that do not count; and the share that must, as
 #: gyros that measure no turn explain whatever is left without the turns.
 LEAST_WINDOWS, LEAST_SHARE, SIGNIFICANT, GROSS, COUNT = 10, 0.6, 5.0, 5.0, 0.8
-#: A bank of 60° makes a ratio of two, and mirrored axes one below zero.
-FAR = 3.0
+#: Speed at which the noise of a velocity, 0.1 m/s, is in a course what sideslip is, 0.01 rad, m/s.
+SLIPS = 10.0
+#: A bank of 60° halves the ratio, none makes it larger, and mirrored axes make it negative.
+LEAST, MOST = 1.0 / 3.0, 3.0
+#: From this ratio on gyros turn too far, too, if it is significant and explains nearly all turns.
+TOO_FAR, TOO_FAR_SHARE = 1.5, 0.95
 #: deg/s for a rad/s, and by how much the ratio may differ from that of two units.
 DEGREES, ABOUT = 180.0 / math.pi, 1.5
 #: Mean specific force that is gravity, m/s².
@@ -127,9 +131,10 @@ def turn_ratio(
     Notes
     -----
     Whatever the mounting, the mean specific force is upward, and the rate about it is that of the
-    heading: the ratio is 1 but for banks (1/cos of the bank and less) and sideslip. The bias of
-    the gyros is a second unknown; the standard deviation is by each window's residual from the
-    fit to the others (HC3 of MacKinnon and White 1985), as one turn may decide.
+    heading: the ratio is 1 but for banks (the cosine of the bank, and more) and sideslip. The bias
+    of the gyros is a second unknown. A window counts by the speeds at its ends, as the course of a
+    slow one is noisier (`SLIPS`). The standard deviation is by each window's residual from the fit
+    to the others (HC3 of MacKinnon and White 1985), as one turn may decide.
     """
     told = courses(gnss, velocity_delay, COURSE_STEP)
     stamps = index_of(imu)
@@ -141,7 +146,8 @@ def turn_ratio(
     course = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
     nodes, sums = integrals(stamps, imu, GYRO, imu.attrs["sampling"] == "mean")
     turned = np.interp(at, nodes, sums @ (-force / size))
-    usual = (np.hypot(*velocity.T) > MOVES) & (at >= stamps[0]) & (at <= stamps[-1])
+    speed = np.hypot(*velocity.T)
+    usual = (speed > MOVES) & (at >= stamps[0]) & (at <= stamps[-1])
     breaks = np.cumsum(~usual | np.append(False, np.diff(at) > LONGEST))
     pairs = []
     begin = 0
@@ -154,8 +160,9 @@ def turn_ratio(
     if len(pairs) < LEAST_WINDOWS:
         return None
     first, last = np.array(pairs).T
-    change = course[last] - course[first]
-    X = np.column_stack([turned[last] - turned[first], at[last] - at[first]])
+    weight = 1.0 / np.sqrt(speed[first] ** -2 + speed[last] ** -2 + SLIPS**-2)
+    change = weight * (course[last] - course[first])
+    X = weight[:, None] * np.column_stack([turned[last] - turned[first], at[last] - at[first]])
     kept = np.ones(len(change), dtype=bool)
     for _ in range(10):
         fit, *_ = np.linalg.lstsq(X[kept], change[kept], rcond=None)
@@ -188,7 +195,10 @@ def check_turns(
         The gyros turn by as much as deg/s are more than rad/s, or less.
     """
     found = turn_ratio(gnss, imu, velocity_delay)
-    if found is None or 1.0 / FAR < found.ratio < FAR:
+    if found is None:
+        return []
+    clear = found.share > TOO_FAR_SHARE and found.ratio - SIGNIFICANT * found.sd > 1.0
+    if LEAST < found.ratio < (TOO_FAR if clear else MOST):
         return []
     facts: dict[str, Any] = {
         "file": source_of(imu),
