@@ -931,7 +931,7 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
             by_name["time"] = Found(clock, 1.0, False)
         if (height := by_name.pop("alt_hae", None)) and "alt" not in asked:
             by_name["alt"] = height
-            by_name = {q: one for q, one in by_name.items() if q not in ("alt_msl", "geoid")}
+            by_name = {q: one for q, one in by_name.items() if q != "alt_msl"}
         return by_name | _over_ground(raw, names, by_name)
     known = FIXES.quantities
     found = {
@@ -953,8 +953,7 @@ def _over_ground(raw: RawLog, names: list[str], found: dict[str, Found]) -> dict
         likely = find_quantities(free, OVER_GROUND, {}, raw.name, raw.units)
     except DataError:
         return {}
-    both = {"speed", "course"} <= found.keys() | likely.keys()
-    return {q: one for q, one in likely.items() if both and q in missing}
+    return {q: one for q, one in likely.items() if q in missing}
 
 
 def plain_name(name: str) -> str:

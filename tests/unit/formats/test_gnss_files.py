@@ -480,7 +480,9 @@ def test_rows_at_latitude_and_longitude_zero_are_no_fixes(tmp_path):
         assert len(table) == left
 
 
-@pytest.mark.parametrize(("zone", "origin"), [("33U", "33N"), ("33 u", "33N"), ("33H", "33S")])
+@pytest.mark.parametrize(
+    ("zone", "origin"), [("33 u", "33N"), ("33U", "33N"), ("33N", "33N"), ("33M", "33S")]
+)
 def test_the_zone_of_utm_in_a_column(tmp_path, zone, origin):
     time = np.arange(5.0)
     columns = (time, 5e5 + 10.0 * time, 5.34e6 + 0.0 * time, 200.0 + 0.0 * time)
