@@ -26,6 +26,7 @@ from strapdown.formats.recording import INFERRED, STATED, Questions, RawLog, Rea
 from strapdown.formats.vocabularies import (
     BODY_RATES,
     FIXES,
+    OVER_GROUND,
     QUANTITIES,
     ROS,
     TRIADS,
@@ -928,7 +929,10 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
         by_name = find_quantities(names, FIXES, asked, raw.name, raw.units)
         if "time" not in by_name and (clock := clock_by_values(raw)):
             by_name["time"] = Found(clock, 1.0, False)
-        return by_name
+        if (height := by_name.pop("alt_hae", None)) and "alt" not in asked:
+            by_name["alt"] = height
+            by_name = {q: one for q, one in by_name.items() if q != "alt_msl"}
+        return by_name | _over_ground(raw, names, by_name)
     known = FIXES.quantities
     found = {
         quantity: Found(column, 1.0 if unit is None else known[quantity].units[unit], True)
@@ -937,6 +941,19 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
     }
     named = find_quantities(raw.columns, FIXES, asked, raw.name) if asked else {}
     return found | {quantity: named[quantity] for quantity in asked}
+
+
+def _over_ground(raw: RawLog, names: list[str], found: dict[str, Found]) -> dict[str, Found]:
+    """Find speed and course of fixes by names that say less; empty in a log, or if two fit."""
+    missing = {"speed", "course"} - found.keys()
+    if not missing or "VN" in found or "gyro_x" in names_of_quantities(raw):
+        return {}
+    free = [n for n in names if n not in {one.source for one in found.values()}]
+    try:
+        likely = find_quantities(free, OVER_GROUND, {}, raw.name, raw.units)
+    except DataError:
+        return {}
+    return {q: one for q, one in likely.items() if q in missing}
 
 
 def plain_name(name: str) -> str:

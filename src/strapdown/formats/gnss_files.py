@@ -24,6 +24,7 @@ from strapdown.formats.gnss_fixes import (
     RADIUS,
     UNSTATED_VERTICAL,
     Fixes,
+    at_zero,
     table_of_fixes,
     utm_zone,
 )
@@ -34,7 +35,13 @@ from strapdown.formats.trajectory_readers import EARTH
 from strapdown.formats.vocabularies import FIXES
 from strapdown.frames import geodetic_from_ecef, geodetic_from_ned, geodetic_from_utm
 from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD, height_words
-from strapdown.tables.gnss import LEAST_STEPS, SPEEDS_OF_OTHERS, along_course, fitting
+from strapdown.tables.gnss import (
+    LEAST_STEPS,
+    SPEEDS_OF_OTHERS,
+    along_course,
+    clock_factor,
+    fitting,
+)
 from strapdown.units import DATE_ORDERS, OF_TABLES, SPEEDS, TIME_UNITS, unit_of
 
 # GNSS fixes from tables with column names: text, Parquet.
@@ -57,11 +64,17 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     raw = _rows_of_fixes(with_degrees(raw, found), found)
     _refuse_missing(raw, found, stated=options.datum_height is not None)
 
+    used = {found["time"].source}
+
     def values(quantity: str) -> Array:
+        used.add(found[quantity].source)
         return found[quantity].values(raw, quantity)
 
     def block(names: Sequence[str]) -> Array | None:
         there = [name for name in names if name in found]
+        if there == list(names[:2]):  # down is unknown
+            level = [values(name) for name in there]
+            return np.column_stack([*level, np.full(level[0].size, np.nan)])
         if there and len(there) < len(names):
             missing = next(name for name in names if name not in found)
             raise raw.fault(
@@ -69,12 +82,15 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
             )
         return np.column_stack([values(name) for name in names]) if there else None
 
+    options, zone = _with_zone(raw, found, options)
+    used.add(zone)
     place, datum = _place(raw, found, values, options)
     time, clock = _time(raw, found["time"], options.units.get("time"))
     if time.size > 2 and (np.diff(time) < 0.0).all():
         return fixes_of_columns(raw.backward(), options)
     if "week" in found and clock.name == RELATIVE:
         clock = Clock(GPS)
+    sound = np.where(at_zero(place)[:, None], np.nan, place)
     if "week" in found and clock.name == GPS:
         week = values("week")
         time = time + WEEK * (week - week[0])
@@ -84,9 +100,14 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     if velocity is not None and velocity_sd is None and "speed_sd" in found:
         velocity_sd = _sd_of_speed(raw, found, values)
     if velocity is None and {"speed", "course"} <= found.keys():
-        velocity, velocity_sd = _over_ground(raw, found, values, (time, place))
+        velocity, velocity_sd = _over_ground(raw, found, values, (time, sound))
     if velocity is not None:
-        _refuse_unit_of_speed(raw, found, time, place, velocity)
+        if clock.name == RELATIVE:
+            _refuse_unit_of_clock(raw, found["time"], time, sound, velocity)
+        _refuse_unit_of_speed(raw, found, time, sound, velocity)
+    position_sd = _accuracy(raw, found, values) if position_sd is None else position_sd
+    quality, satellites = _quality(raw, found, values), _satellites(raw)
+    _say_unused(raw, found, used | {satellites})
     return Fixes(
         name=raw.name,
         time=time,
@@ -94,10 +115,10 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         rows=np.arange(1, time.size + 1) if raw.rows is None else raw.rows,
         clock=clock,
         velocity=velocity,
-        position_sd=_accuracy(raw, found, values) if position_sd is None else position_sd,
+        position_sd=position_sd,
         velocity_sd=velocity_sd,
-        quality=_quality(raw, found, values),
-        satellites=_satellites(raw),
+        quality=quality,
+        satellites=np.asarray(raw.columns[satellites], dtype=float) if satellites else None,
         heights_from=_level(raw, found, datum, options),
         height_source=found[datum].source if datum in found else "",
         findings=raw.findings,
@@ -273,6 +294,41 @@ def _place(
     return geodetic_from_ned(ned, options.origin), "alt"
 
 
+#: Names of a column with the zone of UTM, with the letter of its band: C to M south, N to X north.
+_ZONES, _ZONE = (
+    ("zone", "utmzone", "zoneutm", "gridzone"),
+    re.compile(r"(\d{1,2}) ?([C-HJ-NP-X])", re.I),
+)
+
+
+def _with_zone(
+    raw: RawLog, found: dict[str, Found], options: GnssOptions
+) -> tuple[GnssOptions, str]:
+    """Take the zone of UTM of a column, which is the same in all rows; and its name, or none.
+
+    33S may be the band between 32 and 40 deg north, or the south, and is left open.
+    """
+    if options.origin is not None or not set(_LOCAL) <= found.keys():
+        return options, ""
+    if set(_GEODETIC) <= found.keys() or set(_ECEF) <= found.keys():
+        return options, ""
+    for name in raw.columns:
+        texts = (
+            {str(text).strip() for text in raw.columns[name]} if plain_name(name) in _ZONES else {}
+        )
+        match = _ZONE.fullmatch(next(iter(texts))) if len(texts) == 1 else None
+        if match and match[2].upper() != "S" and 1 <= int(match[1]) <= 60:
+            zone = f"{match[1]}{'N' if match[2].upper() >= 'N' else 'S'}"
+            raw.note(
+                "io.utm-zone-by-column",
+                ", ".join(found[q].source for q in _LOCAL),
+                source=name,
+                zone=zone,
+            )
+            return dataclasses.replace(options, origin=zone), name
+    return options, ""
+
+
 def _without_up(raw: RawLog) -> DataError:
     return raw.fault(
         "io.missing-columns-2", missing=["up"], columns=list(raw.columns), missing_2="up"
@@ -299,7 +355,8 @@ _HIGHEST = 1e5
 def _height(found: dict[str, Found], values: Callable[[str], Array], raw: RawLog) -> Array:
     for quantity in _HEIGHTS:
         one = found.get(quantity)
-        heights = values(quantity) if one is not None and not one.stated else np.empty(0)
+        read = one is not None and not one.stated
+        heights = one.values(raw, quantity) if one is not None and read else np.empty(0)
         known = heights[np.isfinite(heights)]
         if one is not None and known.size and float(np.median(np.abs(known))) > _HIGHEST:
             raise height_unit_open(raw, "io.height-too-large", quantity, one, float(known[0]))
@@ -469,6 +526,36 @@ def _sd_of_speed(raw: RawLog, found: dict[str, Found], values: Callable[[str], A
     return np.column_stack([np.where(stated > 0.0, stated, np.nan)] * 3)
 
 
+def _refuse_unit_of_clock(
+    raw: RawLog, found: Found, time: Array, place: Array, velocity: Array
+) -> None:
+    """Refuse stamps with which the positions move as the velocity only in another unit.
+
+    `time` ((n,), s). `place` ((n, 3)): deg, deg, m. `velocity` ((n, 3)): m/s.
+    """
+    known = np.isfinite(place).all(axis=1) & np.isfinite(velocity[:, :2]).all(axis=1)
+    later = np.flatnonzero(known & np.isfinite(time))
+    later = later[np.diff(np.maximum.accumulate(time[later]), prepend=-np.inf) > 0.0]
+    if later.size <= LEAST_STEPS:
+        return
+    sd = np.full(later.size, _UNSTATED_SD)
+    factor = clock_factor(time[later], sd, velocity[later, :2], place[later])
+    scale = found.factor * factor
+    unit = next((u for u in ("s", "ms", "us", "ns") if np.isclose(TIME_UNITS[u], scale)), "")
+    if factor == 1.0 or not unit:
+        return
+    raise raw.fault(
+        "io.time-unit-unlike-speed",
+        "time",
+        source=found.source,
+        unit=unit,
+        factor=factor,
+        python=f'{{"time": "{unit}"}}',
+        flags=f"--gnss-units time={unit}",
+        keys=f'units = {{time = "{unit}"}}',
+    )
+
+
 #: Steps between fixes from which a speed is computed, s, and the least distance in them, m.
 _STEPS, _WAY = (0.05, 10.0), 50.0
 #: How near the ratio to the speed of the positions is that of a unit.
@@ -612,14 +699,24 @@ def _quality(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array
 _SATELLITES = ("satellites", "satellitesused", "numsatellites", "numsv", "nsats", "nsat", "sats")
 
 
-def _satellites(raw: RawLog) -> Array | None:
-    """Satellites of each fix for display; None if no column has them as numbers."""
+def _satellites(raw: RawLog) -> str:
+    """Column of the satellites of each fix, for display; empty if none has them as numbers."""
     names = {re.sub(r"\W|_", "", name.lower()): name for name in raw.columns}
     for known in _SATELLITES:
         column = raw.columns.get(names.get(known, ""))
         if column is not None and column.dtype.kind in "fiu":
-            return np.asarray(column, dtype=np.float64)
-    return None
+            return names[known]
+    return ""
+
+
+def _say_unused(raw: RawLog, found: dict[str, Found], used: set[str]) -> None:
+    """List the columns that no quantity of a fix takes; in a log, those of fixes among them."""
+    if raw.stated:
+        return
+    in_log = "gyro_x" in names_of_quantities(raw)
+    names = [one.source for one in found.values()] if in_log else list(raw.columns)
+    if names := [name for name in names if name and name not in used]:
+        raw.note("io.columns-not-used", names=names)
 
 
 def open_fixes(path: str | Path) -> RawLog | Fixes | None:

@@ -305,8 +305,26 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
     return time, keep
 
 
+#: Distance of all other fixes from latitude and longitude 0, from which on it is no place, deg of
+#: arc: 100 km.
+_FAR = 0.9
+
+
+def at_zero(place: Array) -> NDArray[np.bool_]:
+    """Return the rows, (n,), that a receiver without a fix wrote at latitude and longitude 0.
+
+    `place` ((n, 3)): deg, deg, m. None where another fix is nearer than `_FAR`.
+    """
+    zero: NDArray[np.bool_] = (place[:, :2] == 0.0).all(axis=1)
+    lat, lon = np.radians(place[~zero & np.isfinite(place[:, :2]).all(axis=1), :2]).T
+    far = np.degrees(np.arccos(np.cos(lat) * np.cos(lon))) > _FAR
+    return zero & bool(far.size and far.all())
+
+
 def _placed(fixes: Fixes, quality: Array, options: GnssOptions) -> NDArray[np.bool_]:
     """Select the rows with a position; fixes of quality 0 may lack it."""
+    zero = at_zero(fixes.place)
+    _say_left_out(fixes, ~zero, "io.fixes-at-zero-left-out")
     there = np.asarray(np.isfinite(fixes.place).all(axis=1))
     bad = np.flatnonzero(~there & (quality != 0.0))
     if bad.size and not options.repair:
@@ -320,7 +338,7 @@ def _placed(fixes: Fixes, quality: Array, options: GnssOptions) -> NDArray[np.bo
             count=bad.size,
         )
     _say_left_out(fixes, there, "io.fixes-without-position-left-out")
-    return there
+    return there & ~zero
 
 
 def _say_left_out(fixes: Fixes, keep: NDArray[np.bool_], code: str) -> None:

@@ -314,8 +314,9 @@ LOGS = Vocabulary(
 _HEADS = ("v", "vel", "velocity", "speed")
 
 
-def _velocities(letter: str, word: str) -> tuple[str, ...]:
-    return tuple(h + e for h in _HEADS for e in (letter, word)) + tuple(word + h for h in _HEADS)
+def _velocities(letter: str, *words: str) -> tuple[str, ...]:
+    behind = tuple(h + e for h in _HEADS for e in (letter, *words))
+    return behind + tuple(word + h for word in words for h in _HEADS)
 
 
 #: Degrees, meters over the ellipsoid, meters per second; velocity up is negative velocity down.
@@ -338,12 +339,18 @@ _GEODETIC: dict[str, Quantity] = {
             "alt altitude h hgt height hell altell heightell ellipsoidalheight heightellipsoid "
             "altitudeellipsoid ellipsoidheight ellheight heightwgs84 altitudewgs84 "
             "altellipsoid hae höhe hohe hoehe altitud altura altitudine quota hoogte высота "
-            "高度 고도"
+            "高度 고도 wysokość wysokosc"
         ),
         LENGTHS,
     ),
-    "VN": Quantity(_velocities("n", "north"), SPEEDS),
-    "VE": Quantity(_velocities("e", "east"), SPEEDS),
+    "VN": Quantity(
+        (*_velocities("n", *_words("north nord norte noord север")), "北向速度", "北速"), SPEEDS
+    ),
+    "VE": Quantity(
+        _velocities("e", *_words("east ost est este oost восток"))
+        + _words("东向速度 東向速度 东速"),
+        SPEEDS,
+    ),
     "VD": Quantity(_velocities("d", "down"), SPEEDS, _velocities("u", "up")),
 }
 TRAJECTORIES = Vocabulary(
@@ -384,6 +391,8 @@ FIXES = Vocabulary(
             ),
             LENGTHS,
         ),
+        # It counts beside other heights.
+        "alt_hae": Quantity(_words("althae altitudehae heighthae"), LENGTHS),
         "geoid": Quantity(
             _words("geoid undulation geoidsep geoidseparation geoidheight geoidundulation"), LENGTHS
         ),
@@ -438,13 +447,18 @@ FIXES = Vocabulary(
             LENGTHS,
         ),
         "speed": Quantity(
-            _words("speed sog gspeed groundspeed locationspeed speedoverground"), SPEEDS
+            _words(
+                "speed sog gspeed groundspeed locationspeed speedoverground geschwindigkeit "
+                "vitesse velocidad velocità velocita snelheid hastighet prędkość predkosc rychlost "
+                "brzina rapidez скорость 速度 车速 航速 속도"
+            ),
+            SPEEDS,
         ),
         "speed_sd": Quantity(_words("speedaccuracy speedsd sacc locationspeedaccuracy"), SPEEDS),
         "course": Quantity(
             _words(
                 "course cog bearing courseoverground locationcourse track directionofmotion "
-                "gpsheading gnssheading headmot"
+                "gpsheading gnssheading headmot kurs rumbo rotta koers курс 航向 航向角"
             ),
             ANGLES,
         ),
@@ -453,6 +467,20 @@ FIXES = Vocabulary(
     },
     OF_TABLES,
     before=re.compile(r"(?:gps|gnss|navsat|location|loc|position|pos|coords|fix)(?=..)"),
+)
+
+#: Names that are those of a speed and a course beside the positions of a receiver, and elsewhere
+#: may be others: of the velocity of a sensor, of the axis of a vehicle.
+OVER_GROUND = Vocabulary(
+    {
+        "speed": Quantity(("velocity",), SPEEDS),
+        "course": Quantity(
+            _words("heading hdg azimuth azimut cap direction richtung direccion направление 方向"),
+            ANGLES,
+        ),
+    },
+    OF_TABLES,
+    before=FIXES.before,
 )
 
 

@@ -255,7 +255,14 @@ def check_velocity(table: pd.DataFrame) -> Fit | None:
     good = usable(table, [*POSITION_SD[:2], *VELOCITY_SD[:2]])
     if good.sum() > LEAST_STEPS:
         readings = _readings(velocities[good, :2], places[good])
-        fit = fitting(time[good], sds[good, :2].max(axis=1), readings)
+        sd = sds[good, :2].max(axis=1)
+        fit = fitting(time[good], sd, readings)
+        if fit is None or not fit.name:
+            factor = clock_factor(time[good], sd, *readings["told"])
+            if factor != 1.0:
+                raise DataError(
+                    "tables.time-in-other-unit", file=source, quantity="time", factor=factor
+                )
         if fit is not None and fit.name not in ("", "told"):
             code, pair = fit.name, fit.name.split(",")
             north, east = pair if len(pair) == 2 else ("", "")
@@ -287,6 +294,36 @@ def check_velocity(table: pd.DataFrame) -> Fit | None:
             data = {"speed": climb.speed, "moved": climb.moved}
             raise DataError("tables.velocity-up", file=source, row=row, quantity="VD", **data)
     return fit
+
+
+#: Factors to s of stamps that count in another unit than the one that is stated.
+_CLOCKS = (1e-3, 1e-6, 1e-9, 1e3, 1e6)
+
+
+def clock_factor(time: Array, sd: Array, velocity: Array, place: Array) -> float:
+    """Return the factor to s of stamps of another unit, with which velocity and positions agree.
+
+    Parameters
+    ----------
+    time : ndarray, (n,)
+    sd : ndarray, (n,), m
+    velocity : ndarray, (n, 2), m/s
+        North and east.
+    place : ndarray, (n, 3), deg, deg, m
+
+    Returns
+    -------
+    float
+        1 if the stamps agree as they are, in any reading of the velocity, or if none of `_CLOCKS`
+        does.
+    """
+    own, limits = {"told": (velocity, place)}, (ALIKE, ALIKE, LEAST_SPEED)
+    fits = (k for k in _CLOCKS if (f := fitting(k * time, sd, own, limits)) and f.name)
+    factor = next(fits, 1.0)
+    if factor == 1.0:
+        return factor
+    plain = fitting(time, sd, _readings(velocity, place))
+    return 1.0 if plain is not None and plain.name else factor
 
 
 def _readings(velocity: Array, place: Array) -> dict[str, tuple[Array, Array]]:

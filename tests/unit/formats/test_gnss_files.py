@@ -10,7 +10,8 @@ from tests.coded import coded
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import ReadOptions, read_log
 from strapdown.formats.gnss_files import GnssOptions, open_fixes, read_gnss
-from strapdown.tables import GNSS, check_gnss
+from strapdown.frames import geodetic_from_ned
+from strapdown.tables import GNSS, check_gnss, gnss_table
 from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
 KF = [
@@ -366,3 +367,142 @@ def test_negative_numbers_are_no_standard_deviations(tmp_path, sign, fixes):
     else:
         with pytest.raises(DataError, check=coded("io.missing-columns-2")):
             read_gnss(path)
+
+
+def turning(rows=60):
+    """Stamps, s, places, deg, deg, m, and velocity, m/s, of fixes of a turn at 10 m/s."""
+    time, angle = np.arange(float(rows)), np.linspace(0.0, 1.2, rows)
+    velocity = 10.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    way = np.vstack([[0.0, 0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]), axis=0)])
+    up = np.full(rows, 200.0)
+    return time, geodetic_from_ned(np.column_stack([way, 0.0 * up]), (48.2, 16.3, 200.0)), velocity
+
+
+def read_columns(folder, head, columns, sep=",", **options):
+    rows = [sep.join(str(c) for c in row) for row in zip(*columns, strict=True)]
+    path = written(folder, "\n".join([head, *rows]) + "\n")
+    return read_gnss(path, GnssOptions(position_sd=1.0, velocity_sd=0.1, **options))
+
+
+def unused(table):
+    found = [f for f in table.attrs["findings"] if f.code == "io.columns-not-used"]
+    return [name for f in found for name in f.data["names"]]
+
+
+@pytest.mark.parametrize(
+    ("head", "sep"),
+    [
+        ("Zeit;Breite;Länge;Höhe;Geschwindigkeit (km/h);Kurs", ";"),
+        ("время;широта;долгота;высота;скорость, км/ч;курс", ";"),
+        ("时间,纬度,经度,高度,速度(km/h),航向", ","),
+        ("tiempo,latitud,longitud,altitud,velocidad (km/h),rumbo", ","),
+        ("temps;latitude;longitude;altitude;vitesse (km/h);cap", ";"),
+        ("tempo;latitudine;longitudine;altitudine;velocità (km/h);rotta", ";"),
+        ("czas;lat;lon;wysokość;prędkość (km/h);kurs", ";"),
+        ("time,lat,lon,alt,speed [km/h],heading [deg]", ","),
+        ("time,lat,lon,alt,velocity [km/h],course", ","),
+    ],
+)
+def test_speed_and_course_in_words_of_several_languages(tmp_path, head, sep):
+    time, place, velocity = turning()
+    course = np.degrees(np.arctan2(velocity[:, 1], velocity[:, 0]))
+    table = read_columns(tmp_path, head, (time, *place.T, 36.0 + 0.0 * time, course), sep)
+    assert np.allclose(table[["VN", "VE"]], velocity, rtol=0.0, atol=1e-12)
+    assert (table[["VN_sd", "VE_sd"]] == 0.1).all(axis=None) and np.isinf(table["VD_sd"]).all()
+    assert not unused(table)
+
+
+def test_columns_of_fixes_that_nothing_uses_are_listed(tmp_path):
+    time, place, velocity = turning()
+    north, east = velocity.T
+    still = 0.0 * time
+    # Which way is up is not said, and of which axes x and y are.
+    head = "temps;latitude;longitude;altitude;vitesse nord (m/s);vitesse est (m/s);"
+    table = read_columns(
+        tmp_path, head + "vitesse verticale (m/s)", (time, *place.T, north, east, still), ";"
+    )
+    assert np.array_equal(table[["VN", "VE"]], velocity) and np.isinf(table["VD_sd"]).all()
+    assert unused(table) == ["vitesse verticale (m/s)"]
+    table = read_columns(
+        tmp_path, "time,lat,lon,alt,vx,vy,vz", (time, *place.T, *velocity.T, still)
+    )
+    assert np.isinf(table[VELOCITY_SD]).all(axis=None) and unused(table) == ["vx", "vy", "vz"]
+    # A course precedes a heading, and a heading without a speed says nothing of a velocity.
+    course = np.degrees(np.arctan2(east, north))
+    columns = (time, *place.T, 10.0 + still, course, course + 90.0)
+    table = read_columns(tmp_path, "time,lat,lon,alt,speed,course,heading", columns)
+    assert np.allclose(table[["VN", "VE"]], velocity) and unused(table) == ["heading"]
+    table = read_columns(tmp_path, "time,lat,lon,alt,heading", (time, *place.T, course))
+    assert np.isinf(table[VELOCITY_SD]).all(axis=None) and unused(table) == ["heading"]
+    table = read_columns(tmp_path, "time,lat,lon,alt,speed", (time, *place.T, 10.0 + still))
+    assert unused(table) == ["speed"]
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "unit"),
+    [("time_s", 1e3, "ms"), ("time", 1e6, "us"), ("time_ms", 1.0, "s")],
+)
+def test_a_clock_of_another_unit_is_told_by_the_speed(tmp_path, name, factor, unit):
+    time, place, velocity = turning()
+    columns = (factor * time, *place.T, *velocity.T, 0.0 * time)
+    head = f"{name},lat,lon,alt,vn,ve,vd"
+    with pytest.raises(DataError, check=coded("io.time-unit-unlike-speed", unit=unit)):
+        read_columns(tmp_path, head, columns)
+    table = read_columns(tmp_path, head, columns, units={"time": unit})
+    assert np.allclose(table.index, time) and np.array_equal(table[["VN", "VE"]], velocity)
+
+
+def test_a_table_of_another_clock_is_refused():
+    time, place, velocity = turning()
+    velocity = np.column_stack([velocity, 0.0 * time])
+    gnss_table(time, place, velocity, 1.0 * np.ones(3), 0.1 * np.ones(3))
+    for factor in (1e3, 1e6, 1e-3):
+        with pytest.raises(
+            DataError, check=coded("tables.time-in-other-unit", factor=1.0 / factor)
+        ):
+            gnss_table(factor * time, place, velocity, np.ones(3), 0.1 * np.ones(3))
+    # A receiver that stands says nothing of its clock.
+    still = np.random.default_rng(1).normal(0.0, 0.01, (60, 3))
+    gnss_table(1e3 * time, place[:1] + 0.0 * place, still, np.ones(3), 0.1 * np.ones(3))
+
+
+def test_rows_at_latitude_and_longitude_zero_are_no_fixes(tmp_path):
+    time, place, _ = turning()
+    place[:15] = 0.0
+    table = read_columns(tmp_path, "time,lat,lon,alt", (time, *place.T))
+    assert np.array_equal(table.index, time[15:]) and np.array_equal(table[GEODETIC], place[15:])
+    said = [f for f in table.attrs["findings"] if f.code == "io.fixes-at-zero-left-out"]
+    assert [(f.row, f.data["count"]) for f in said] == [(2, 15)]
+    # Off the coast of Ghana they may be: 0.8 deg of arc are 89 km, 1 deg is 111 km.
+    for east, left in ((0.8, 60), (1.0, 45)):
+        place[15:, :2] = 0.0, east
+        table = read_columns(tmp_path, "time,lat_deg,lon_deg,alt", (time, *place.T))
+        assert len(table) == left
+
+
+@pytest.mark.parametrize(
+    ("zone", "origin"), [("33 u", "33N"), ("33U", "33N"), ("33N", "33N"), ("33M", "33S")]
+)
+def test_the_zone_of_utm_in_a_column(tmp_path, zone, origin):
+    time = np.arange(5.0)
+    columns = (time, 5e5 + 10.0 * time, 5.34e6 + 0.0 * time, 200.0 + 0.0 * time)
+    head = "time,easting,northing,height"
+    stated = read_columns(tmp_path, head, columns, origin=origin)
+    table = read_columns(tmp_path, f"{head},zone", (*columns, [zone] * 5))
+    assert np.array_equal(table[GEODETIC], stated[GEODETIC]) and not unused(table)
+    # The band S is north of the equator, the S of a hemisphere is not; two zones are two grids.
+    for zones in (["33S"] * 5, ["33U"] * 4 + ["32U"], ["61U"] * 5):
+        with pytest.raises(DataError, check=coded("io.utm-zone-open")):
+            read_columns(tmp_path, f"{head},zone", (*columns, zones))
+
+
+@pytest.mark.parametrize("head", ["altHAE,altMSL", "altMSL,altHAE", "alt,altHAE,altMSL,geoidSep"])
+def test_the_height_over_the_ellipsoid_precedes_others(tmp_path, head):
+    time, place, _ = turning()
+    heights = {"altHAE": place[:, 2], "altMSL": place[:, 2] - 45.0, "geoidSep": 0.0 * time + 44.0}
+    heights["alt"] = heights["altMSL"]
+    columns = [heights[name] for name in head.split(",")]
+    table = read_columns(tmp_path, f"time,lat,lon,{head}", (time, *place[:, :2].T, *columns))
+    assert np.array_equal(table["alt"], place[:, 2])
+    assert set(unused(table)) == set(head.split(",")) - {"altHAE"}
+    assert "io.height-level-open" not in {f.code for f in table.attrs["findings"]}
