@@ -721,7 +721,8 @@ def _check_named_step(log: LogInUse, ticks: NDArray[Any]) -> None:
     column = log.found["time"]
     if column.unit is None or ticks.size < 3:
         return
-    step = float(ticks[-1] - ticks[0]) / (ticks.size - 1)
+    # Unsigned stamps may go back.
+    step = (float(ticks[-1]) - float(ticks[0])) / (ticks.size - 1)
     if step <= 0.0 or (rate := 1.0 / (step * factor_of(column.unit, TIME_UNITS))) <= FASTEST:
         return
     likely = infer_time_unit(ticks)
