@@ -485,9 +485,8 @@ def _names(texts: tuple[str, ...], rows: list[list[str]]) -> list[str] | None:
             continue
         elif name in _LEVELS and texts[run[0]].endswith("("):
             name, unit = LEADING, unit or "ms"
-        ends = [""] if len(run) == 1 else " x, y, z" if len(run) == 3 else map(str, range(len(run)))
-        for end in ends.split(",") if isinstance(ends, str) else ends:
-            names.append(f"{name} {end.strip()}".strip() + (f" [{unit}]" if unit else ""))
+        ends = {1: [""], 3: [" x", " y", " z"]}.get(len(run), [f" {k}" for k in range(len(run))])
+        names += [f"{name}{end} [{unit}]" if unit else f"{name}{end}" for end in ends]
     return names
 
 

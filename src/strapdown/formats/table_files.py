@@ -198,18 +198,19 @@ def read_json_table(path: Path) -> RawLog:
     """Read the members of the objects as columns, missing ones as NaN."""
     if _APART.search(head(path)):
         return _names_apart(path)
-    top = head(path).lstrip()
+    top, whole = head(path).lstrip(), None
     if _is_by_columns(top) or _ROWS.match(top):
         return _by_columns(path)
     if (_NESTED.match(top) or _MEMBER.match(top)) and "}\n{" not in top:
-        content = _unwrapped(from_json(path))
+        whole = from_json(path)
+        content = _unwrapped(whole)
         if parts := _sensors_apart(content):
             return _joined(path, parts)
         if isinstance(content, dict) and any(isinstance(v, list) for v in content.values()):
             lists = [v for v in content.values() if isinstance(v, list)]
             if not all(v and isinstance(v[0], dict) for v in lists):
                 return _of_columns(path, content)
-    objects, rows, findings = _objects(path)
+    objects, rows, findings = _objects(path, whole)
     if blocks := _of_blocks(objects):
         return _joined_blocks(path, blocks, findings)
     kind = next(
@@ -481,12 +482,14 @@ def _names_apart(path: Path) -> RawLog:
     )
 
 
-def _objects(path: Path) -> tuple[list[dict[str, Any]], list[int], list[Finding]]:
-    """Return the objects, each with its line or its number in the list."""
+def _objects(
+    path: Path, whole: Any = None
+) -> tuple[list[dict[str, Any]], list[int], list[Finding]]:
+    """Return the objects, each with its line or its number in the list; `whole`: parsed before."""
     text, findings = csv.decoded(path.read_bytes(), path.name)
     inside = _MEMBER.match(text.lstrip()) and "}\n{" not in text
     if text.lstrip().startswith("[") or inside:
-        content = from_json(path)
+        content = from_json(path) if whole is None else whole
         if isinstance(content, dict):
             content = next((v for v in content.values() if isinstance(v, list)), [])
         if not content or not all(isinstance(o, dict) for o in content):
