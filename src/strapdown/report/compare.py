@@ -117,13 +117,15 @@ class NumberRow:
         pairs = zip(self.differences, self.combined, strict=True)
         return tuple(None if d is None or b is None else abs(d) <= b for d, b in pairs)
 
+    def alike(self, k: int) -> bool:
+        """Whether run `k` has the value of the first, with the same bound, to rounding."""
+        first, one = self.values[0], self.values[k]
+        return first is not None and one is not None and _alike(one, first)
+
     @property
     def same(self) -> bool:
         """Whether all runs have this value, with the same bound."""
-        first = self.values[0]
-        return first is not None and all(
-            one is not None and _alike(one, first) for one in self.values[1:]
-        )
+        return all(map(self.alike, range(len(self.values))))
 
 
 def _alike(one: Value, first: Value) -> bool:

@@ -388,16 +388,16 @@ def _apart(row: NumberRow, k: int, factor: float) -> str:
         if other.at is not None and first.at is not None and other.at != first.at:
             return "other instant"
         return ""
+    if row.alike(k):
+        return SAME
     half = row.combined[k]
-    if half is not None and math.isfinite(half) and half > 0.0 and apart != 0.0:
+    if half is not None and math.isfinite(half) and half > 0.0:
         said, _ = bounded(factor * apart, factor * half)
         signed = row.any.kind != "horizontal" and said.strip("0.") and not said.startswith(MINUS)
         return f"+{said}" if signed else said
     if row.any.kind == "horizontal":
-        return plain(apart, decimals(apart, 2)) if apart else SAME
-    if apart == 0.0:
-        return SAME
-    return _signed(factor * apart)
+        return plain(apart, decimals(apart, 2))
+    return _signed(factor * apart) if apart else "0"
 
 
 def shown_value(value: Value, factor: float, places: int) -> tuple[str, str]:

@@ -228,6 +228,10 @@ def test_a_row_is_shown_with_the_digits_of_its_bounds(tmp_path):
     assert (lat["unit"], lat["bound_unit"], lat["bounds"]) == ("", "m", ["± 5.9", "± 7.8"])
     # A ten-millionth of a degree is a centimeter: a meter has six decimals.
     assert lat["values"] == ["55.750000°", "55.750010°"]
+    # The same speed with a wider bound is not the same result; a wholly equal one is.
+    assert shown("end.VN_m_per_s")["differences"][1] == "0.0"
+    sealed(tmp_path / "c", files={"navigation.json": first})
+    result = sd.compare_runs(tmp_path / "a", tmp_path / "c")
     assert shown("end.VN_m_per_s")["differences"][1] == "same"
 
 
