@@ -8,9 +8,17 @@ import type { MapInfo } from "./types";
 
 setWorkerUrl(new URL("./map-worker.js", import.meta.url).href);
 
-const feature = (line: Line, kind: "LineString" | "MultiPoint") => ({
+/** Parts of a line between its pauses. */
+const partsOf = (line: Line) => line.t.reduce<number[][][]>((parts, _, i) => {
+  const at = [line.lon[i]!, line.lat[i]!];
+  if (at.every(Number.isFinite)) parts[parts.length - 1]!.push(at);
+  else if (parts[parts.length - 1]!.length) parts.push([]);
+  return parts;
+}, [[]]);
+
+const feature = (line: Line, points: boolean) => ({
   type: "Feature" as const, properties: {},
-  geometry: { type: kind, coordinates: line.t.map((_, i) => [line.lon[i]!, line.lat[i]!]).filter(([a, b]) => Number.isFinite(a) && Number.isFinite(b)) },
+  geometry: points ? { type: "MultiPoint" as const, coordinates: partsOf(line).flat() } : { type: "MultiLineString" as const, coordinates: partsOf(line).filter((part) => part.length > 1) },
 });
 
 /** Draw the map into `place`; an error is thrown where the browser cannot. */
@@ -39,7 +47,7 @@ export function drawMap(place: HTMLElement, info: MapInfo, props: PlanProps): Ma
   map.on("load", () => {
     const add = (id: string, line: Line | null | undefined, name: string, points: boolean) => {
       if (!line || !line.t.length) return;
-      map.addSource(id, { type: "geojson", data: feature(line, points ? "MultiPoint" : "LineString") });
+      map.addSource(id, { type: "geojson", data: feature(line, points) });
       if (points) map.addLayer({ id, type: "circle", source: id, paint: { "circle-radius": 3, "circle-color": color(name) } });
       else map.addLayer({ id, type: "line", source: id, paint: { "line-width": 3, "line-color": color(name) } });
     };
@@ -68,6 +76,7 @@ export function drawMap(place: HTMLElement, info: MapInfo, props: PlanProps): Ma
       if (t === null || !line || !line.t.length) { dot.remove(); return; }
       let i = line.t.findIndex((one) => one >= t);
       if (i < 0) i = line.t.length - 1;
+      if (!Number.isFinite(line.lat[i]!) || !Number.isFinite(line.lon[i]!)) { dot.remove(); return; }
       dot.setLngLat([line.lon[i]!, line.lat[i]!]).addTo(map);
       if (!map.getBounds().contains([line.lon[i]!, line.lat[i]!])) map.panTo([line.lon[i]!, line.lat[i]!], { animate: !still });
     },

@@ -85,7 +85,7 @@ function Begin() {
       {address && LOCAL.test(address) && <p class="notice warn" role="status">A phone cannot reach {address}: only programs on this computer can.{places.length > 0 && " For a phone in the same network choose 0.0.0.0 above."}</p>}
       {info.value!.warning && address && !LOCAL.test(address) && <p class="notice warn" role="status">{sentence(info.value!.warning)}</p>}
       <div class="next startrun">
-        <label class="inline">Name of the session <input type="text" value={name} onInput={(e) => setName(e.currentTarget.value)} /></label>
+        <label class="inline">Name of the session <input type="text" value={name} onInput={(e) => { setName(e.currentTarget.value); setProblem(null); }} /></label>
         <button type="button" class="main" disabled={!name.trim() || taken} onClick={() => void begin()}>Listen</button>
         {taken && <span class="soft">There is one of this name.</span>}
       </div>
@@ -112,6 +112,19 @@ function periodOf(lines: Record<string, unknown>[]): number {
   const came = lines.slice(-100).map((line) => num(line, CAME)!);
   const pauses = came.map((at, i) => at - (came[i - 1] ?? at)).filter((ms) => ms > 50).sort((a, b) => a - b);
   return pauses[pauses.length >> 1] ?? LEAST / PERIODS;
+}
+
+/** States with an empty one in each pause, so that curves break there and do not join over it. */
+function withPauses(lines: Record<string, unknown>[]): Record<string, unknown>[] {
+  const steps = lines.slice(1).map((line, i) => num(line, "time")! - num(lines[i]!, "time")!);
+  return lines.flatMap((line, i) => {
+    const step = steps[i];
+    // Against the steps beside it: the page has states of a long session at wider steps.
+    const near = [...steps.slice(Math.max(0, i - 2), i), ...steps.slice(i + 1, i + 3)].sort((a, b) => a - b);
+    const usual = near[near.length >> 1];
+    const pause = step !== undefined && usual !== undefined && step > Math.max(LEAST / 1000, PERIODS * usual);
+    return pause ? [line, { time: num(line, "time")! + step / 2 }] : [line];
+  });
 }
 
 function Session({ job }: { job: Job }) {
@@ -182,15 +195,15 @@ function LiveState({ lines, session, old }: { lines: Record<string, unknown>[]; 
   const last = lines[lines.length - 1]!, time = num(last, "time")!;
   const [cursor, setCursor] = useState<number | null>(null);
   const track = useMemo<Line | null>(() => {
-    const seen = lines.filter((line) => num(line, "lat") !== null && num(line, "lon") !== null);
-    return seen.length ? { t: seen.map((line) => num(line, "time")!), lat: seen.map((line) => num(line, "lat")!), lon: seen.map((line) => num(line, "lon")!) } : null;
+    const seen = withPauses(lines.filter((line) => num(line, "lat") !== null && num(line, "lon") !== null));
+    return seen.length ? { t: seen.map((line) => num(line, "time")!), lat: seen.map((line) => num(line, "lat") ?? NaN), lon: seen.map((line) => num(line, "lon") ?? NaN) } : null;
   }, [lines.length, time]);
   const panels = useMemo<Panel[]>(() => CURVES.filter(([, , names]) => names.some((name) => num(last, name) !== null))
     .map(([title, unit, names]) => ({ title, unit, columns: names.map((name) => ({ name, label: name })) })), [session, Object.keys(last).join()]);
   // The curves are drawn twice a second, the attitude with every state.
   const beat = Math.floor(Date.now() / 500);
   const whole = useMemo<Span>(() => [num(lines[0]!, "time")!, Math.max(time, num(lines[0]!, "time")! + 1)], [beat, session]);
-  const held = lines.filter((line) => { const t = num(line, "time")!; return t <= whole[1]; });
+  const held = withPauses(lines.filter((line) => num(line, "time")! <= whole[1]));
   const ask = async (columns: string[], view: Span): Promise<Series> => {
     const seen = held.filter((line) => { const t = num(line, "time")!; return t >= view[0] && t <= view[1]; });
     const of = (name: string) => seen.map((line) => num(line, name));

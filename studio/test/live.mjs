@@ -39,11 +39,14 @@ await run(async () => {
   await see(/Only programs on this computer reach this address/);
   assert.equal(await page.getByRole("img", { name: /^Code to scan/ }).count(), 0);
   const target = await shown.innerText();
-  for (let i = 0; i < 24; i++) {
-    const answer = await fetch(target, { method: "POST", body: message(i), headers: { "Content-Type": "application/json" } });
-    assert.equal(answer.status, 200);
-    await new Promise((resolve) => setTimeout(resolve, 500));
-  }
+  const send = async (from, to) => {
+    for (let i = from; i < to; i++) {
+      const answer = await fetch(target, { method: "POST", body: message(i), headers: { "Content-Type": "application/json" } });
+      assert.equal(answer.status, 200);
+      await new Promise((resolve) => setTimeout(resolve, 500));
+    }
+  };
+  await send(0, 24);
   const words = page.locator(".attitude figcaption");
   // Without a magnetometer a heading is from the start: 20 deg a second to the left, for 11.9 s. Each angle has its bound.
   await words.getByText(/Facing 1[12]\d\.\d° to the right of the direction at the start \(±.[\d.]+°\), nose .*\(±.*level across \(±/).waitFor();
@@ -53,17 +56,22 @@ await run(async () => {
   // A phone that sends no more is silent, and what is shown is of then.
   await see(/^Silent for/);
   await see(/Nothing has come for .*: what is shown is of 1[12]\.\d+ s/);
+  // It goes on after a pause, over which no curve is drawn.
+  await send(40, 46);
+  await see("Receiving");
+  await look("live-3-after-a-pause");
+  await see(/^Silent for/);
   await page.reload();
   // The states before the reload are there again, and how long it has been silent.
   await see(/^Silent for/);
-  await see(/^0\.\d+ to 1[12]\.\d+ s$/);
+  await see(/^0\.\d+ to 2[23]\.\d+ s$/);
   await click("Stop listening");
   await page.getByText("Stop listening").waitFor({ state: "detached" });
-  await look("live-3-ended");
+  await look("live-4-ended");
   // What was received is a log like any other.
   await click("Look into phone-1");
   await see("The traces");
   await page.locator(".plot canvas").first().waitFor();
-  await look("live-4-log");
+  await look("live-5-log");
   done("live");
 });

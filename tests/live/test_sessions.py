@@ -235,3 +235,40 @@ def test_sessions_are_bounded(tmp_path, monkeypatch):
     assert hub.count == 3
     assert [one.code for one in warned].count("live.message-refused") == 1
     hub.finish()
+
+
+def test_a_silence_is_reported_once_and_so_is_its_end(tmp_path):
+    class Clock(MachineClock):
+        at = 100.0
+
+        def now(self):
+            return self.at
+
+    hub, _, warned = hub_in(tmp_path)
+    hub.clock = clock = Clock()
+    given = messages(readings(TIME, Motion()))
+
+    def send(message):
+        hub.sensor_logger(json.dumps(message), "sensor-logger", clock.at)
+        hub._sessions[next(iter(hub._sessions))]._clock = clock
+
+    def silences():
+        found = [(one.code, one.data["seconds"]) for one in warned if "seconds" in one.data]
+        warned.clear()
+        return found
+
+    send(given[0])
+    hub._sessions[next(iter(hub._sessions))].last = clock.at
+    for _ in range(80):
+        clock.at += 0.1
+        hub.report_silent()
+    assert silences() == [("live.session-silent", pytest.approx(5.1, abs=0.11))]
+    send(given[1])
+    assert silences() == [("live.session-again", pytest.approx(8.0))]
+    # A sender that pauses for 8 s is silent after three times as long.
+    clock.at += 23.0
+    hub.report_silent()
+    assert silences() == []
+    clock.at += 2.0
+    hub.report_silent()
+    assert silences() == [("live.session-silent", pytest.approx(25.0))]

@@ -250,6 +250,8 @@ def test_numbers_of_a_live_state_are_those_of_the_reports():
         "Velocity north": (f"\N{MINUS SIGN}3.220{gap}m/s", ""),
         "steps taken": ("12.00", ""),
     }
+    # An angle whose bound is half a turn can be any.
+    assert shown_state({"heading": 62.0, "heading_sd": 102.0})[0]["bound"] == "unknown"
 
 
 def live_output(folder, lines):

@@ -33,6 +33,8 @@ __all__ = ["Hub", "StateWriter"]
 
 #: Most sessions that are open at once; after so long without a message one ends, s.
 MOST_SESSIONS, SILENT = 64, 600.0
+#: A silence is reported after so long, s, and after so many times the longest pause before it.
+REPORTED, PAUSES = 5.0, 3.0
 #: Command of a line that ends its session.
 END = "end"
 Key = tuple[str, str, str]
@@ -207,6 +209,16 @@ class Hub:
         now = self.clock.now()
         for key in [k for k, s in self._sessions.items() if now - s.last > SILENT]:
             self._end(key)
+
+    def report_silent(self) -> None:
+        """Report each device that has stopped sending, once until it sends again."""
+        now = self.clock.now()
+        for session in self._sessions.values():
+            since = now - session.last
+            if not session.silent and since > max(REPORTED, PAUSES * session.pause):
+                session.silent = True
+                said = {"session": session.name, "seconds": since}
+                self._warn(Finding("live.session-silent", severity="note", **said))
 
     def finish(self) -> None:
         """End all sessions."""

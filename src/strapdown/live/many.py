@@ -170,13 +170,14 @@ async def _run(
             listening(web.address, web.loopback)
         hub.writer.said(said)
         end = None if duration is None else hub.clock.now() + duration
-        silent = 0
+        looks = 0
         while wanted() and hub.writer.there and hub.error is None:
             if end is not None and hub.clock.now() >= end:
                 break
             await asyncio.sleep(LOOK)
-            silent += 1
-            if silent % 100 == 0:
+            looks += 1
+            hub.report_silent()
+            if looks % 100 == 0:
                 hub.end_silent()
     finally:
         for feed in begun:

@@ -212,6 +212,10 @@ class Session:
     name : str
     last : float, s
         When the last message came, by the clock of the run.
+    pause : float, s
+        The longest between two messages.
+    silent : bool
+        Whether it was reported that nothing comes; what comes next is reported, too.
     unused : Counter
         Messages, lines and values that were not used, by reason.
     messages, events : int
@@ -255,7 +259,7 @@ class Session:
         self.messages = self.events = self.lost = 0
         self._numbers: set[int] = set()
         self._newest_number: int | None = None
-        self.last = clock.now()
+        self.last, self.pause, self.silent = clock.now(), 0.0, False
         self.error: StrapdownError | None = None
         self._estimate: _Estimate
         if spec is None:
@@ -291,7 +295,12 @@ class Session:
         parsed = self._clock.now()
         self._parsed.take(arrived, parsed)
         self.messages, self.events = self.messages + 1, self.events + len(received)
-        self.last = arrived
+        paused, self.last = max(0.0, arrived - self.last), arrived
+        self.pause = max(self.pause, paused)
+        if self.silent:
+            self.silent = False
+            said = {"session": self.name, "seconds": paused}
+            self._warn(Finding("live.session-again", severity="note", **said))
         self.journal.append(*received)
         self._journaled.take(parsed, self._clock.now())
         for one in received:

@@ -175,7 +175,8 @@ STAMPS = ("time", "unix")
 def shown_state(line: Mapping[str, Any]) -> list[dict[str, str]]:
     """Return the numbers of a state line as the reports show them: name, value, 95 % bound.
 
-    The bound is empty where the line has no standard deviation.
+    The bound is empty where the line has no standard deviation, and "unknown" of an angle that
+    can be any.
     """
     found = []
     for key in line:
@@ -191,6 +192,8 @@ def shown_state(line: Mapping[str, Any]) -> list[dict[str, str]]:
             said, bound = bounded(value, math.inf if half is None else half)
             said = f"{said}{GAP}{unit}" if unit else said
         bound = f"{bound}{GAP}{unit}" if bound and unit else bound
+        if unit == "deg" and half is not None and half >= HALF_TURN:
+            bound = "unknown"
         found.append({"name": name, "value": said, "bound": bound})
     return found
 
@@ -203,6 +206,8 @@ def _finite(line: Mapping[str, Any], key: str) -> float | None:
     return float(value) if abs(value) < BEYOND else None
 
 
+#: Bound from which on an angle can be any, deg.
+HALF_TURN = 180.0
 #: Numbers that no state has.
 BEYOND = 1e30
 
