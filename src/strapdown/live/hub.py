@@ -217,8 +217,11 @@ class Hub:
             since = now - session.last
             if not session.silent and since > max(REPORTED, PAUSES * session.pause):
                 session.silent = True
-                silent = Finding("live.session-silent", severity="note", session=session.name)
-                self._warn(silent.replace(seconds=since))
+                self._warn(
+                    Finding(
+                        "live.session-silent", severity="note", session=session.name, seconds=since
+                    )
+                )
 
     def finish(self) -> None:
         """End all sessions."""

@@ -299,8 +299,9 @@ class Session:
         self.pause = max(self.pause, paused)
         if self.silent:
             self.silent = False
-            again = Finding("live.session-again", severity="note", session=self.name)
-            self._warn(again.replace(seconds=paused))
+            self._warn(
+                Finding("live.session-again", severity="note", session=self.name, seconds=paused)
+            )
         self.journal.append(*received)
         self._journaled.take(parsed, self._clock.now())
         for one in received:
