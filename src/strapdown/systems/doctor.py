@@ -75,8 +75,6 @@ from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, MAG, POSITION_SD, find_gaps
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["USES", "Diagnosis", "LogDiagnosis", "refused_fixes", "run_doctor"]
-
 Array = NDArray[np.float64]
 
 #: Uses that a log is judged for.

@@ -34,17 +34,6 @@ from strapdown.tables import (
 )
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = [
-    "check_fixes",
-    "float_position_sd",
-    "gnss_readiness",
-    "lasting_position_sd",
-    "receiver_findings",
-    "repeated_rows",
-    "white_position_sd",
-    "without_repeats",
-]
-
 
 def gnss_readiness(
     table: pd.DataFrame,
