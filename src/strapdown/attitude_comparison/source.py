@@ -90,6 +90,7 @@ def read_source(spec: AttitudeSpec) -> AttitudeSource:
         log = read_log(asked.path, replace(read_options(asked, asked.axes), axes_by_gravity=True))
         turned = [f for f in log.findings if f.code == "attitude.axes-by-gravity"]
         axes = str(turned[0].data["axes"]) if turned else asked.axes
+        findings = (*(f for f in log.findings if f not in turned), *turned)
         return AttitudeSource(
             log.name,
             "recorded log",
@@ -98,7 +99,7 @@ def read_source(spec: AttitudeSpec) -> AttitudeSource:
             log.truth,
             log.scored,
             log.readings,
-            (*(f for f in log.findings if f not in turned), *turned),
+            findings,
             log_files(asked.path, log.files, asked.calibration),
             axes=axes,
         )

@@ -29,8 +29,8 @@ from strapdown.dsp.chi_square import (
     clopper_pearson,
     student_quantile,
 )
+from strapdown.tables.checks import Array
 
-Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Keys = NDArray[np.uint64]
 

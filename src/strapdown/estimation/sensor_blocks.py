@@ -15,15 +15,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.errors import ConfigError, check_choice
 from strapdown.estimation.sensor_states import COUPLING, SensorStates, StateBlock
 from strapdown.sensors.triad_errors import Triad, TriadLike, triad_of
 from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty, TriadUncertainty
-from strapdown.tables.checks import is_number
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, is_number
 
 XYZ = ("x", "y", "z")
 #: Indices of the rates and of the forces in a coupling.

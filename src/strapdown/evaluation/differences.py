@@ -15,12 +15,10 @@ from strapdown.dsp.samples import running_integral
 from strapdown.errors import Finding
 from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import EULER, GYRO, QUATERNION
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.checks import Array, index_of, values_of
 
 if TYPE_CHECKING:
     from strapdown.attitude_algorithms.algorithm import AttitudeRun
-
-Array = NDArray[np.float64]
 
 
 def attitude_at(attitude: pd.DataFrame, time: ArrayLike) -> Array:

@@ -20,9 +20,8 @@ from strapdown.evaluation.second_log import (
 )
 from strapdown.sensors.lever_arm import lever_matrix, rate_effect
 from strapdown.tables import ACCEL, GYRO, check_imu
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.checks import Array, index_of, values_of
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 #: Shortest step of the grid on which two logs are compared, s: motion of a body is below 10 Hz.

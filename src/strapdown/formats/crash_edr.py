@@ -25,9 +25,8 @@ from strapdown.formats.crash_record import LONGEST_NAME, CrashChannel, CrashReco
 from strapdown.formats.crash_samples import Clock, seconds_of
 from strapdown.formats.crash_table import MOST_REMARKS, NOTE, ChannelName, channel_name
 from strapdown.formats.text_columns import NUMBER, decoded, fields_of, separator_of
+from strapdown.tables.checks import Array
 from strapdown.units import FACTORS, OF_CRASHES, SPEEDS, TIME_UNITS, find_unit, unit_words
-
-Array = NDArray[np.float64]
 
 KMH = SPEEDS["km/h"]
 #: 49 CFR 563.8, Table III: delta-V is recorded from −100 to 100 km/h at least.

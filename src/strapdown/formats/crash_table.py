@@ -33,9 +33,9 @@ from strapdown.formats.crash_samples import ONE_STEP, Clock, seconds_of
 from strapdown.formats.recording import RawLog
 from strapdown.formats.text_columns import decoded, is_comment
 from strapdown.formats.vocabularies import CRASHES
+from strapdown.tables.checks import Array
 from strapdown.units import FACTORS, OF_CRASHES, find_unit
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 # Fraction of numeric fields from which on a column of text is a damaged column of numbers.

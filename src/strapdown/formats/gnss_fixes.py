@@ -14,10 +14,16 @@ from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warn
 from strapdown.formats.arrays import told_by_file_rows
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
 from strapdown.tables import gnss_table
-from strapdown.tables.checks import GEODETIC, HEIGHTS_AS_STATED, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables.checks import (
+    GEODETIC,
+    HEIGHTS_AS_STATED,
+    POSITION_SD,
+    VELOCITY,
+    VELOCITY_SD,
+    Array,
+)
 from strapdown.tables.gnss import check_velocity
 
-Array = NDArray[np.float64]
 Sd = float | tuple[float, float, float]
 
 #: Radius of 68 % of a circular normal distribution, in standard deviations (Android,

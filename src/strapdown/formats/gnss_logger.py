@@ -35,8 +35,7 @@ from strapdown.formats.known_formats import column, optional, sensor_log, stated
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 from strapdown.formats.text_columns import decoded, parsed
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 KINDS = {
     "gyro": (("Gyro", "UncalGyro"), "rad/s"),

@@ -23,8 +23,8 @@ from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.signs import Signs
 from strapdown.formats.text_columns import columns_at_once, decoded
 from strapdown.frames import geodetic_from_ecef, q_ne
+from strapdown.tables.checks import Array
 
-Array = NDArray[np.float64]
 #: Receivers of Emlid write it with the second ending, and without a line of names.
 SUFFIXES = (".pos", ".llh")
 #: RTKLIB's Q (1 fix, 2 float, 3 SBAS, 4 DGPS, 5 single, 6 PPP, 7 dead reckoning) to field 6 of

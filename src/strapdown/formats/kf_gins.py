@@ -36,9 +36,8 @@ from strapdown.formats.writing import (
     write_numbers,
 )
 from strapdown.tables import ACCEL, GYRO, TRAJECTORY, check_trajectory, trajectory_table
-from strapdown.tables.checks import MAG, POSITION_SD, VELOCITY_SD, index_of, values_of
+from strapdown.tables.checks import MAG, POSITION_SD, VELOCITY_SD, Array, index_of, values_of
 
-Array = NDArray[np.float64]
 COLUMNS = ["time", *(f"dtheta_{a}" for a in "xyz"), *(f"dv_{a}" for a in "xyz")]
 SUFFIXES = (*csv.SUFFIXES, ".imu")
 FOLDER_TITLE = "folder of KF-GINS: increments, fixes, trajectory"

@@ -27,6 +27,7 @@ from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import head
 from strapdown.formats.text_columns import decoded, fields_of
 from strapdown.tables import trajectory_table
+from strapdown.tables.checks import Array
 
 
 def under(path: Path, skip: int = 0, header: str | None = None, drop: int = 0) -> RawLog:
@@ -283,7 +284,6 @@ def force_of(linear: RawLog, gravity: RawLog) -> RawLog:
 # Binary logs: damage, and solutions of their own.
 
 
-Array = NDArray[np.float64]
 #: Argument of `RawLog.of`.
 Quantities = dict[str, tuple[NDArray[Any], str | None]]
 

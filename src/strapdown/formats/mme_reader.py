@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats.crash_record import (
@@ -28,6 +27,7 @@ from strapdown.formats.crash_record import (
 from strapdown.formats.mme_codes import DIMENSIONS, DUMMIES, NO_CLASS, MmeCode, decode_mme
 from strapdown.formats.text_columns import decoded
 from strapdown.tables import SAMPLINGS
+from strapdown.tables.checks import Array
 from strapdown.units import FACTORS, OF_CRASHES, TIME_UNITS, find_unit
 
 MOST_FILES = 20_000
@@ -320,9 +320,6 @@ def _told(file: MmeFile, listed: dict[int, str]) -> list[Finding]:
 
 
 # Channel files of ISO MME: header with the channel code, samples and stamps.
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

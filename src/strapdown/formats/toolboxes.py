@@ -23,9 +23,7 @@ from strapdown.formats.text_columns import decoded, is_comment
 from strapdown.parsers import parse
 from strapdown.rotation import dcm_from_euler
 from strapdown.tables import trajectory_table
-
-Array = NDArray[np.float64]
-
+from strapdown.tables.checks import Array
 
 # Folders of gnss-ins-sim: one table a quantity, and the reference of the simulation.
 #

@@ -28,9 +28,9 @@ from strapdown.formats.writing import TUM_FRAMES, FileOptions
 from strapdown.frames import ecef_from_geodetic, geodetic_from_ecef, q_ne
 from strapdown.rotation import Q_NED_ENU
 from strapdown.tables import EULER, VELOCITY, check_trajectory, places_of, trajectory_table
+from strapdown.tables.checks import Array
 
 TITLE = "poses as of the TUM RGB-D benchmark"
-Array = NDArray[np.float64]
 
 # Half a turn about forward: from forward-left-up to forward-right-down, and back.
 _Q_FRD_FLU = (0.0, 1.0, 0.0, 0.0)

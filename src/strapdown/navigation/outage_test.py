@@ -28,9 +28,7 @@ from strapdown.navigation.smoother import Smoothing
 from strapdown.navigation.truth_comparison import compare_with_truth
 from strapdown.progress import Progress
 from strapdown.tables import ACCEL, GYRO
-from strapdown.tables.checks import index_of, source_of, values_of
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, source_of, values_of
 
 
 @dataclass(frozen=True)

@@ -41,13 +41,12 @@ from strapdown.systems.alignment_source import body_record
 from strapdown.systems.inputs import Memory, SavedRun, refuse_long_span
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import MAG
-from strapdown.tables.checks import GYRO, index_of, values_of
+from strapdown.tables.checks import GYRO, Array, index_of, values_of
 from strapdown.tables.sample_clock import sample_clock
 
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
 
-Array = NDArray[np.float64]
 
 DEG = math.pi / 180.0
 #: Poses that differ by more count as two, rad; a face is up within this, rad.
