@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.earth import earth_rate, gravity, rows
@@ -16,8 +15,7 @@ from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import Finding
 from strapdown.rotation import euler_sd
 from strapdown.sensors.uncertainty import ImuUncertainty
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 #: A well-known attitude must stay so for this long, s.
 AHEAD = 3.0

@@ -26,9 +26,8 @@ from strapdown.tables import (
     check_gnss,
     usable,
 )
-from strapdown.tables.checks import source_of
+from strapdown.tables.checks import Array, source_of
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 #: The rate at an instant is a mean over so much before and after it, s: little against the swaying

@@ -43,9 +43,7 @@ from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, EULER, GYRO, MOTION
-from strapdown.tables.checks import is_number, source_of, values_of
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, is_number, source_of, values_of
 
 # Motion of a body on a floor in a town; a smaller one is not assumed.
 LEAST = Standing(

@@ -52,9 +52,7 @@ from strapdown.estimation.robust import Huber, Igg3, Influence
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
 from strapdown.sensors.uncertainty import FREEDOM, ImuUncertainty
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, usable
-from strapdown.tables.checks import is_number, source_of
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, is_number, source_of
 
 #: Largest allowed tilt error, rad: beyond it attitude errors are no longer small.
 LARGEST_TILT_SD = 0.35

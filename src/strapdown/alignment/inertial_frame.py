@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
@@ -30,9 +29,7 @@ from strapdown.earth import earth_rate
 from strapdown.errors import DataError, Finding, check_choice
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import GYRO
-from strapdown.tables.checks import source_of
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, source_of
 
 EPOCHS = ("end", "start")
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from strapdown.increments import motion_increments
 from strapdown.tables import DV, MOTION, values_of
+from strapdown.tables.checks import Array
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 

@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
@@ -26,7 +25,7 @@ from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import GYRO
-from strapdown.tables.checks import is_number, source_of
+from strapdown.tables.checks import Array, is_number, source_of
 
 # Roll and pitch alone: the heading is undetermined.
 
@@ -115,8 +114,6 @@ class KnownHeading(CoarseAlignment):
 
 # Roll and pitch of a stationary body with their uncertainty, for a stated heading.
 
-
-Array = NDArray[np.float64]
 
 BLOCKS = 10
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.alignment.inertial_sums import InertialSums
 from strapdown.dsp.chi_square import chi_square_exceeded
@@ -15,8 +14,7 @@ from strapdown.dsp.samples import running_integral
 from strapdown.sensors.triad_errors import Triad
 from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 
 def rate_covariance(sensors: ImuUncertainty, length: float, rate: Array, force: Array) -> Array:

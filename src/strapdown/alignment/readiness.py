@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment, Site
@@ -21,9 +20,7 @@ from strapdown.estimation.error_filter import FilterState
 from strapdown.increments import increments_from_imu
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import EULER, GYRO, QUATERNION, attitude_table, check_attitude, check_imu
-from strapdown.tables.checks import source_of, values_of
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, source_of, values_of
 
 SD = [f"{angle}_sd" for angle in EULER]
 ERROR = [f"{angle}_error" for angle in EULER]

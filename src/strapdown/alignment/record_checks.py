@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Site
 from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
@@ -12,9 +11,7 @@ from strapdown.earth import radii_of_curvature
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO, VELOCITY, VELOCITY_SD, check_gnss, check_imu, find_gaps
-from strapdown.tables.checks import source_of
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, source_of
 
 # As in levelling: deviation from gravity beyond any bias, scale or rocking.
 NEAR_GRAVITY = 0.2

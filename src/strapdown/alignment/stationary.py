@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown._kernels.earth import RATE
@@ -24,8 +23,7 @@ from strapdown.estimation.error_model import PHYSICAL, Segment
 from strapdown.mechanization.mechanization import Mechanization, displacement_between
 from strapdown.nav_state import NavState
 from strapdown.sensors.triad_errors import Triad
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 AXES = ("x", "y", "z")
 #: Observations of a rest: Earth rate, constant position, zero velocity.

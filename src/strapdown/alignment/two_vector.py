@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
@@ -34,9 +33,7 @@ from strapdown.alignment.record_checks import (
 from strapdown.constants import DEG_PER_HOUR
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.tables.checks import source_of
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, source_of
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown.api.reading import FoundTable, ImuFile, imu_input, imu_of, imu_of_arrays
@@ -52,13 +52,12 @@ from strapdown.sensors.magnetometer import (
 from strapdown.sensors.rest import find_rests
 from strapdown.systems.inputs import NOWHERE, Memory, moved
 from strapdown.tables import ACCEL, EULER, GYRO, MAG, QUATERNION, attitude_table
-from strapdown.tables.checks import as_array, check_same_length, view_of
+from strapdown.tables.checks import Array, as_array, check_same_length, view_of
 from strapdown.tables.imu import imu_of_columns
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
 
 ANGLES_SD = ["roll_sd", "pitch_sd", "heading_sd"]
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.attitude_algorithms import (
@@ -85,7 +84,7 @@ from strapdown.sensors.rest import (
 )
 from strapdown.systems.inputs import part_of_log, read_options
 from strapdown.tables import ACCEL, GYRO, MAG, references_table
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.checks import Array, index_of, values_of
 from strapdown.tables.sample_clock import SampleClock
 from strapdown.units import GYRO_SUMS, GYRO_UNITS, factor_of, parse_unit
 
@@ -94,9 +93,6 @@ if TYPE_CHECKING:
     from strapdown.evaluation.second_log import SecondLog
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = ["AttitudeComparison", "run_comparison"]
-
-Array = NDArray[np.float64]
 
 #: Standard deviations from which the mean rate at rest is a bias.
 BIAS_SIGNIFICANT = 3.0

@@ -18,11 +18,7 @@ from strapdown.evaluation.differences import Errors, Known, known_at
 from strapdown.increments import increments_from_imu
 from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import GYRO
-from strapdown.tables.checks import index_of, values_of
-
-__all__ = ["ErrorBudget", "Holding", "find_budget", "holding_time"]
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, values_of
 
 #: Rotations are compared over windows of at most and at least this length, s: so many in a record;
 #: the fewest of them.

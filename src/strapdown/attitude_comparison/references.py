@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.attitude_algorithms import Cost
@@ -32,7 +31,7 @@ from strapdown.evaluation.reference_points import (
 from strapdown.formats import read_log
 from strapdown.sensors.rest import RestStretch, find_rests
 from strapdown.tables import ACCEL, GYRO, MAG, QUATERNION, THETA, attitude_table, find_gaps
-from strapdown.tables.checks import index_of
+from strapdown.tables.checks import Array, index_of
 
 if TYPE_CHECKING:
     from strapdown.attitude_comparison.sweep import Grounds
@@ -40,7 +39,6 @@ if TYPE_CHECKING:
     from strapdown.evaluation.second_log import SecondLog
     from strapdown.orientation_filters import OrientationEstimator
 
-Array = NDArray[np.float64]
 
 #: The word that makes every rest a reference point.
 RESTS = "rests"

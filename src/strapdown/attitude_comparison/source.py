@@ -19,7 +19,7 @@ from strapdown.config.sources import LogSpec, ScenarioSpec
 from strapdown.earth import magnetic_field
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.evaluation.differences import attitude_at, error_angles, gyro_turns
-from strapdown.formats import read_raw, recording_of
+from strapdown.formats import read_log
 from strapdown.formats.clocks import year_of
 from strapdown.formats.inference.rotation_rate import signed_permutations
 from strapdown.formats.recording import Origin, Reading, Recording
@@ -33,13 +33,6 @@ if TYPE_CHECKING:
     from strapdown.simulation import ImuErrors
 
 Array = NDArray[np.float64]
-
-#: Findings that the axes of a log are not stated and gravity is along another one.
-AXES_OPEN = (
-    "io.axes-not-stated-z-up",
-    "io.axes-not-stated-y-up",
-    "io.axes-not-stated-other-up",
-)
 
 
 @dataclass(frozen=True)
@@ -94,29 +87,10 @@ def read_source(spec: AttitudeSpec) -> AttitudeSource:
     """Read the log, or simulate the scenario, of a specification."""
     asked = spec.source
     if isinstance(asked, LogSpec):
-        options = read_options(asked, asked.axes)
-        raw = read_raw(asked.path, options.format)
-        log = recording_of(raw, options)
-        axes, findings = asked.axes, log.findings
-        # Another axis than z points down, by gravity, where no file states the axes.
-        by_gravity = next(
-            (f for f in log.findings if f.code in AXES_OPEN and "example" in f.data), None
-        )
-        if axes is None and by_gravity is not None:
-            axes = str(by_gravity.data["example"])
-            log = recording_of(raw, read_options(asked, axes))
-            findings = (
-                *(f for f in log.findings if f.code not in AXES_OPEN),
-                Finding(
-                    "attitude.axes-by-gravity",
-                    file=log.name,
-                    quantity="axes",
-                    severity="note",
-                    axes=axes,
-                    up=by_gravity.data["up"],
-                    percent=by_gravity.data["percent"],
-                ),
-            )
+        log = read_log(asked.path, replace(read_options(asked, asked.axes), axes_by_gravity=True))
+        turned = [f for f in log.findings if f.code == "attitude.axes-by-gravity"]
+        axes = str(turned[0].data["axes"]) if turned else asked.axes
+        findings = (*(f for f in log.findings if f not in turned), *turned)
         return AttitudeSource(
             log.name,
             "recorded log",

@@ -24,10 +24,8 @@ from strapdown.increments import increments_from_imu
 from strapdown.progress import Progress, silent
 from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import DTHETA, QUATERNION, THETA, increments_table
-from strapdown.tables.checks import values_of
+from strapdown.tables.checks import Array, values_of
 from strapdown.tables.sample_clock import SampleClock
-
-Array = NDArray[np.float64]
 
 MEANINGS = ("drop", "sum")
 COLUMNS = [

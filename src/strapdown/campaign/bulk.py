@@ -50,12 +50,8 @@ from strapdown.systems.outage_run import ALIGNED, drift_of_sensor, sensor_of
 from strapdown.systems.trajectory_source import make_motion, scenario_of
 from strapdown.tables import ACCEL, GYRO, NED, QUATERNION
 from strapdown.tables import VELOCITY as VELOCITIES
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.checks import Array, index_of, values_of
 from strapdown.units import SPEEDS
-
-__all__ = ["BulkCases", "bulk_attitude", "bulk_cases", "bulk_crash", "bulk_outage"]
-
-Array = NDArray[np.float64]
 
 
 class BulkCases(Protocol):

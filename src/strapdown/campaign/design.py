@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.bundle import InputFiles, input_files, named_paths
 from strapdown.campaign.kinds import KINDS, Table, at_path, with_value
@@ -22,13 +21,11 @@ from strapdown.campaign.specification import CampaignSpec, ParameterTable
 from strapdown.config.reading import OF_LOG, absolute_table
 from strapdown.config.toml_file import TomlFile, read_toml
 from strapdown.errors import ConfigError, check_choice
+from strapdown.tables.checks import Array
 
 if TYPE_CHECKING:
     from strapdown.campaign.bulk import BulkCases
 
-__all__ = ["Campaign", "Case"]
-
-Array = NDArray[np.float64]
 
 #: Streams of random numbers of a campaign, by use.
 COORDINATES, SEEDS, ROWS = 0, 1, 2

@@ -29,25 +29,8 @@ from strapdown.dsp.chi_square import (
     clopper_pearson,
     student_quantile,
 )
+from strapdown.tables.checks import Array
 
-__all__ = [
-    "Consistency",
-    "Extremes",
-    "Moments",
-    "Share",
-    "SobolIndices",
-    "Values",
-    "blocks",
-    "consistency",
-    "count_between",
-    "order_statistics",
-    "quantile_ranks",
-    "quantiles",
-    "share_of",
-    "student_interval",
-]
-
-Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Keys = NDArray[np.uint64]
 

@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 
 from strapdown.campaign.statistics import (
-    Array,
     Extremes,
     Moments,
     Share,
@@ -30,8 +29,7 @@ from strapdown.campaign.statistics import (
 )
 from strapdown.dsp.chi_square import chi_square_quantile
 from strapdown.report.report_bundle import finite
-
-__all__ = ["LEVELS", "STATUSES", "summarise"]
+from strapdown.tables.checks import Array
 
 #: A function that returns an iterator over batches of cases, in order of case.
 Batches = Callable[[], Iterator[Any]]

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown.errors import ConfigError, DataError
 from strapdown.tables.checks import (
     ACCEL,
+    Array,
     Gap,
     as_array,
     check_columns,
@@ -25,8 +26,6 @@ from strapdown.tables.checks import (
     values_of,
 )
 from strapdown.tables.imu import SAMPLINGS
-
-Array = NDArray[np.float64]
 
 #: Frame of the three components. ``body``: forward, right, down, rotating with the vehicle, as a
 #: recorder integrates them; ``ned``: north, east, down; ``impact``: forward, right, down of a

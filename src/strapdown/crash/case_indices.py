@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash import indices
@@ -22,11 +21,8 @@ from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.dsp.channel_class import CHANNEL_CLASSES, LEAST_RATE, cfc_filter
 from strapdown.errors import DataError, Finding
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
+from strapdown.tables.checks import Array
 from strapdown.units import FACTORS, find_unit
-
-__all__ = ["CrashIndex", "occupant_indices", "vehicle_indices"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

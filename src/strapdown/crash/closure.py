@@ -32,16 +32,16 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.pdof import covariance_of
 from strapdown.dsp.chi_square import chi_square_above, normal_above, normal_quantile
 from strapdown.errors import DataError, Finding
 from strapdown.rotation import within_half_turn
+from strapdown.tables.checks import Array
 from strapdown.units import ACCEL_UNITS, SPEEDS
 
-Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
 #: Largest tangential over normal force between vehicles. CRASH3 limits its energy correction

@@ -16,8 +16,7 @@ from strapdown.rotation import level
 from strapdown.sensors.pre_crash import Levelling
 from strapdown.sensors.rest import LEAST_SAMPLES, RestStretch, rest_between
 from strapdown.tables import imu_table
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 COMBINATIONS = ("weighted", "median")
 

@@ -32,8 +32,7 @@ from strapdown.crash.structure import (
 from strapdown.dsp.chi_square import chi_square_above
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.unmeasured import NO_GYRO
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # Relative to the largest variance: smaller covariances are rounding.
 FLOOR, TINY = 1e-12, 1e-30

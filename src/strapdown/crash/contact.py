@@ -7,13 +7,11 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.crash.acceleration import Acceleration
 from strapdown.crash.delta_v import VelocityCourse
 from strapdown.crash.events import CrashEvent, EventRule, two_sds
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # The allowance, as a share of the mean acceleration that opens an event (11 m/s² by the
 # regulation): 1.1 m/s², above what tire forces change by within a contact's rise.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.delta_v import DeltaV
@@ -16,12 +16,9 @@ from strapdown.crash.events import CrashEvent
 from strapdown.crash.pdof import AngleInterval, Pdof, pdof, pdof_interval
 from strapdown.dsp.samples import running_integral
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.tables.checks import as_array, check_rows, check_same_length, check_time
+from strapdown.tables.checks import Array, as_array, check_rows, check_same_length, check_time
 
 # Rollover criterion: a rigid body about the wheels on one side.
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

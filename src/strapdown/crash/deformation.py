@@ -7,19 +7,18 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.closure import CONTACT_FRICTION, Figure, Pair, jacobian_of
 from strapdown.crash.events import PART_563
 from strapdown.crash.path import PLACE, at_instant
 from strapdown.errors import DataError
+from strapdown.tables.checks import Array
 
 if TYPE_CHECKING:
     from strapdown.crash.events import CrashEvent
     from strapdown.crash.path import CrashPath
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

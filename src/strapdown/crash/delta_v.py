@@ -14,8 +14,7 @@ from strapdown.crash.acceleration import Acceleration, check_within, window_weig
 from strapdown.crash.events import CrashEvent
 from strapdown.dsp.samples import running_integral
 from strapdown.errors import ConfigError, DataError
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 #: The window of Tadic and Vukajlovic (2016), section 4.
 WINDOW = 0.030

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
 from strapdown.constants import TWO_SIDED_95
@@ -19,8 +19,8 @@ from strapdown.crash.path import ATTITUDE, VELOCITY, CrashPath
 from strapdown.crash.pdof import NedPdof, Pdof, PdofInterval, ned_pdof, pdof, pdof_interval
 from strapdown.errors import DataError
 from strapdown.rotation import cross_matrix
+from strapdown.tables.checks import Array
 
-Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 #: Names of the windows in words.

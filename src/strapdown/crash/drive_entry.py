@@ -65,9 +65,7 @@ from strapdown.tables import (
     check_gnss,
     check_imu,
 )
-from strapdown.tables.checks import index_of, values_of
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, values_of
 
 
 def entry_state_from_gnss(

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown.errors import ConfigError, Finding, check_choice
 from strapdown.nav_state import NavState
 from strapdown.sensors.triad_errors import finite, triple
+from strapdown.tables.checks import Array
 
-Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 NUMBERS = (
     ("time", "s"),

@@ -35,9 +35,7 @@ from strapdown.rotation import cross_matrix
 from strapdown.sensors.triad_errors import ZERO, Triad
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, EULER, GEODETIC, GYRO, VELOCITY
-from strapdown.tables.checks import values_of
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, values_of
 
 # Noise between two fixes is approximated by impulses at most this far apart, s.
 PIECE = 0.25

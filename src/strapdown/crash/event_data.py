@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.record_parts import (
@@ -20,9 +19,8 @@ from strapdown.crash.record_parts import (
 from strapdown.errors import DataError, Finding
 from strapdown.formats.crash_edr import KMH, element_of, rounding
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
+from strapdown.tables.checks import Array
 from strapdown.units import FACTORS, SPEEDS, TIME_UNITS
-
-Array = NDArray[np.float64]
 
 
 class Recorder(NamedTuple):

@@ -8,12 +8,13 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown._kernels import crash_events as kernel
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import Acceleration, window_weights
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.tables.checks import Array
 from strapdown.tables.imu import SAMPLINGS
 from strapdown.units import SPEEDS
 
@@ -374,8 +375,6 @@ def _no_event(detector: EventDetector, acceleration: Acceleration, cut: float) -
 
 # Sample-by-sample event detection, as in a vehicle's recorder.
 
-
-Array = NDArray[np.float64]
 
 #: Criteria of time zero, in the order of the kernel's marks.
 BASES = ("longitudinal", "lateral", "resultant", "acceleration")

@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.channel_class import CfcCoefficients, both_ways
 from strapdown.dsp.samples import running_integral
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.tables.checks import Array
 
-Array = NDArray[np.float64]
 # Stamps are rounded; steps that differ by more than this fraction are not uniform.
 SAME_STEP = 0.02
 

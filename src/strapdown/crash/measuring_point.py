@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
@@ -36,8 +35,7 @@ from strapdown.sensors.unmeasured import (
     unmeasured_turns,
 )
 from strapdown.tables import ACCEL, GYRO
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # Contributors common to all units of one vehicle.
 VEHICLE = "vehicle"

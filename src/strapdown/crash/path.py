@@ -38,9 +38,8 @@ from strapdown.sensors.pre_crash import Levelling
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import ACCEL, EULER, GYRO, MOTION, NED, POSITION_SD
 from strapdown.tables import VELOCITY as VELOCITIES
+from strapdown.tables.checks import Array
 from strapdown.tables.on_disk import let_go, parts_of, room, tidy
-
-Array = NDArray[np.float64]
 
 # Columns of an error: rotation vector in level, velocity, position.
 ATTITUDE, VELOCITY, PLACE = slice(0, 3), slice(3, 6), slice(6, 9)

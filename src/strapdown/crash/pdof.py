@@ -9,14 +9,13 @@ from statistics import NormalDist
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.crash.acceleration import Acceleration
 from strapdown.crash.delta_v import DeltaV, delta_v
 from strapdown.errors import ConfigError, DataError, check_choice
 from strapdown.rotation import within_half_turn
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 
 @dataclass(frozen=True)

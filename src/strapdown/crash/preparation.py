@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import force_at_rest
@@ -46,9 +45,7 @@ from strapdown.sensors.unmeasured import (
     with_gyro,
 )
 from strapdown.tables import ACCEL, imu_table
-
-Array = NDArray[np.float64]
-
+from strapdown.tables.checks import Array
 
 #: Roll, pitch and their standard deviation on any road, deg.
 ANY_ROAD = (0.0, 0.0, 10.0)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
@@ -52,6 +51,7 @@ from strapdown.sensors.synchronise import SynchronisedUnits, synchronise
 from strapdown.sensors.triad_errors import FARTHEST, finite, span, triple
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import NED
+from strapdown.tables.checks import Array
 
 if TYPE_CHECKING:
     from strapdown.crash.drive_entry import DriveEntry
@@ -139,9 +139,6 @@ def _size(change: VelocityChange) -> str:
 
 
 # Crash reconstruction from one unit, or from the mean of several.
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding
@@ -45,6 +44,7 @@ from strapdown.formats.inference.rotation_rate import infer_gyro
 from strapdown.formats.triad_units import mirrored
 from strapdown.formats.vocabularies import AXIS_WORDS, CRASHES
 from strapdown.sensors.saturation import find_limits
+from strapdown.tables.checks import Array
 from strapdown.units import (
     ACCEL_UNITS,
     FACTORS,
@@ -55,7 +55,6 @@ from strapdown.units import (
     find_unit,
 )
 
-Array = NDArray[np.float64]
 Left = list[tuple[str, str]]
 
 

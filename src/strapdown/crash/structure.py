@@ -13,8 +13,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.measuring_point import PointKinematics, SampleEffects
 from strapdown.errors import Finding
 from strapdown.sensors.unmeasured import AXES
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 #: Line of the error budget.
 STRUCTURE = "structure"

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.config.toml_text import (
@@ -61,9 +60,8 @@ from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.pre_crash import find_pre_crash_rest
 from strapdown.sensors.saturation import find_limits
 from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.checks import Array
 from strapdown.units import GYRO_UNITS
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown._kernels import crash_trigger as kernel
 from strapdown.constants import STANDARD_GRAVITY
@@ -17,8 +17,7 @@ from strapdown.crash.pdof import clock_of, pdof, pdof_interval
 from strapdown.crash.severity import SEVERITY_MODELS, find_severity_model, injury_risk
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.uncertainty import TriadUncertainty
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 #: Slope of a road, and lean of a vehicle on its springs, as a standard deviation, rad.
 SLOPE = math.radians(6.0)

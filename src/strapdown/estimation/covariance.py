@@ -11,11 +11,9 @@ from types import ModuleType
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 
 @dataclass(frozen=True, eq=False)

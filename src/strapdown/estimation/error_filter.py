@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown._kernels.compensation import compensate, errors_of_states
@@ -28,8 +27,7 @@ from strapdown.estimation.error_model import PHYSICAL, ErrorModel, Segment
 from strapdown.estimation.sensor_states import StateLayout
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # Relative excess of a noise over its known part, so that the difference stays positive
 # semidefinite: for a noise of deficient rank, as that of a quaternion's four numbers, rounding of

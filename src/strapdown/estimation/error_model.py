@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown._kernels import psi_model as kernel
 from strapdown._kernels import wander_errors
@@ -20,8 +19,7 @@ from strapdown.estimation.sensor_states import SensorStates, Stacked, StateBlock
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
 from strapdown.sensors.triad_errors import Triad
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 #: Physical errors of a state of navigation: displacement, velocity as a vector, rotation.
 PHYSICAL = 9

@@ -15,43 +15,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.errors import ConfigError, check_choice
 from strapdown.estimation.sensor_states import COUPLING, SensorStates, StateBlock
 from strapdown.sensors.triad_errors import Triad, TriadLike, triad_of
 from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty, TriadUncertainty
-from strapdown.tables.checks import is_number
-
-__all__ = [
-    "ERRORS_OF_SENSORS",
-    "STATED_STATES",
-    "StateProcess",
-    "accel_bias",
-    "accel_drift",
-    "accel_misalignment",
-    "accel_scale",
-    "g_sensitivity",
-    "gauss_markov",
-    "gyro_bias",
-    "gyro_drift",
-    "gyro_misalignment",
-    "gyro_scale",
-    "lever_arm",
-    "mounting",
-    "random_walk",
-    "resting_sd",
-    "resting_states",
-    "standard_states",
-    "stated_states",
-    "states_that_are_stated",
-    "time_offset",
-    "unseen",
-    "with_processes",
-]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, is_number
 
 XYZ = ("x", "y", "z")
 #: Indices of the rates and of the forces in a coupling.

@@ -9,11 +9,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, check_choice
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 #: First axis of a coupling: a constant part, and the parts per rate x, y, z and per force x, y, z.
 COUPLING = 7

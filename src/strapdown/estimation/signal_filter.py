@@ -6,13 +6,11 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Chernodarov, CovarianceForm, UpdateRule
 from strapdown.estimation.robust import RobustUpdate
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # Remainder of a change after so many time constants of the smoother.
 FORGOTTEN = 1e-4

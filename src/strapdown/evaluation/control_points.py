@@ -12,18 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError
 from strapdown.evaluation.trajectory_differences import trajectory_at
 from strapdown.frames import ned_from_geodetic
 from strapdown.tables import places_of
-from strapdown.tables.checks import index_of, source_of, values_of
-
-__all__ = ["ControlPointScore", "rigid_fit", "score_control_points"]
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, source_of, values_of
 
 #: Least distance from point to point, m: closer points define no direction.
 NO_WAY = 1e-6

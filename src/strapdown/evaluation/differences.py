@@ -15,15 +15,10 @@ from strapdown.dsp.samples import running_integral
 from strapdown.errors import Finding
 from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import EULER, GYRO, QUATERNION
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.checks import Array, index_of, values_of
 
 if TYPE_CHECKING:
     from strapdown.attitude_algorithms.algorithm import AttitudeRun
-
-__all__ = ["attitude_at", "error_angles", "largest_differences", "rotation_contradicted"]
-
-
-Array = NDArray[np.float64]
 
 
 def attitude_at(attitude: pd.DataFrame, time: ArrayLike) -> Array:

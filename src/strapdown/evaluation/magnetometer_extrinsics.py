@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.attitude_algorithms import Quaternion, run_attitude
@@ -30,11 +29,7 @@ from strapdown.evaluation.second_log import EvenRates, even_rates, even_values
 from strapdown.increments import increments_from_imu
 from strapdown.sensors.magnetometer import SHAPES, calibrate_magnetometer
 from strapdown.tables import GYRO, MAG, check_imu, imu_table
-from strapdown.tables.checks import index_of, values_of
-
-__all__ = ["imu_to_magnetometer"]
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, values_of
 
 #: Windows within which the field is constant: so many in a log, and their length, s.
 WINDOWS, SHORTEST_WINDOW, LONGEST_WINDOW = 24, 3.0, 10.0

@@ -20,7 +20,6 @@ from itertools import pairwise
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.attitude_algorithms.algorithm import AttitudeRun
@@ -30,16 +29,7 @@ from strapdown.evaluation.differences import attitude_at
 from strapdown.evaluation.reference_points import INSTANT, NUMBER, instant
 from strapdown.sensors.rest import RestStretch
 from strapdown.tables import ACCEL, QUATERNION
-
-__all__ = [
-    "DeadReckoningErrors",
-    "Leg",
-    "PlaceReference",
-    "dead_reckon",
-    "is_place",
-    "parse_place",
-    "score_places",
-]
+from strapdown.tables.checks import Array
 
 
 @dataclass(frozen=True)
@@ -183,8 +173,6 @@ def parse_place(text: str, start: float, end: float) -> PlaceReference:
 
 # Comparison of position references with the run dead-reckoned between rests.
 
-
-Array = NDArray[np.float64]
 
 # A time that is rounded to a tenth, or given at the edge of a window, still means the rest.
 NEAR_REST = 0.5  # s

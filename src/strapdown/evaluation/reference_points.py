@@ -32,19 +32,7 @@ from strapdown.increments import increments_from_imu
 from strapdown.rotation import level
 from strapdown.sensors.rest import RestStretch
 from strapdown.tables import EULER, THETA, references_table
-
-__all__ = [
-    "ACCEL_BIAS_SD",
-    "in_words",
-    "parse_reference",
-    "reference_errors",
-    "references_from_words",
-    "same_pose_candidates",
-    "score_references",
-    "tilt_references",
-    "tilt_sd_deg",
-    "with_tilt",
-]
+from strapdown.tables.checks import Array
 
 
 @dataclass(frozen=True)
@@ -332,8 +320,6 @@ def references_from_words(words: list[str], start: float, end: float) -> pd.Data
 
 # Rests as reference points: while a sensor is stationary, gravity gives roll and pitch.
 
-
-Array = NDArray[np.float64]
 
 #: Assumed standard deviation of the bias of each accelerometer, m/s², by class of sensor.
 #: Consumer: the MPU-6050 bias may be 50 mg in x and y and 80 mg in z (data sheet 3.4, section 6.2),

@@ -25,24 +25,8 @@ from strapdown.tables import (
     trajectory_error_table,
     trajectory_table,
 )
-from strapdown.tables.checks import view_of
+from strapdown.tables.checks import Array, view_of
 from strapdown.tables.on_disk import let_go
-
-__all__ = [
-    "ROTATION_ERROR",
-    "SAME_BEAT",
-    "DifferenceSummary",
-    "InterpolationCost",
-    "QuantityError",
-    "interpolation_cost",
-    "same_stamps",
-    "summarise_differences",
-    "trajectory_at",
-    "trajectory_differences",
-]
-
-
-Array = NDArray[np.float64]
 
 ROTATION_ERROR = ["phi_N", "phi_E", "phi_D"]
 # Trajectories that begin farther apart are checked for wrong units and signs.

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown._kernels import arithmetic
 from strapdown._kernels import crash_trigger as kernel
@@ -19,8 +18,7 @@ from strapdown.export.program import (
     constant_lines,
     precision_lines,
 )
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 HOME = "strapdown._kernels.crash_trigger"
 #: Samples of the test, and those before its crash; the step is exact in single precision.

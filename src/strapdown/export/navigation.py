@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown._kernels import level
@@ -13,8 +12,7 @@ from strapdown.export.kernels import Kernels
 from strapdown.export.program import Harness, StepParts, listed
 from strapdown.mechanization import Mechanization, WanderAzimuth
 from strapdown.nav_state import NavState
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 #: Start of the test: latitude and longitude in rad, m; m/s; and the attitude.
 PLACE, VELOCITY = (0.96875, 0.65625, 150.0), (20.0, -30.0, 0.5)

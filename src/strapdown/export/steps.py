@@ -9,7 +9,6 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown._kernels import covariance
 from strapdown.attitude_algorithms import with_options
@@ -28,8 +27,7 @@ from strapdown.export.program import (
     step_test,
 )
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 
 @dataclass(frozen=True)

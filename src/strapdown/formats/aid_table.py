@@ -19,6 +19,7 @@ from strapdown.formats.recording import NoStreamError, RawLog, Recording
 from strapdown.formats.triad_units import axes_matrix
 from strapdown.formats.vocabularies import DATED, Quantity, Vocabulary, spread_of
 from strapdown.tables import MAG, NED, POSITION_SD
+from strapdown.tables.checks import Array
 from strapdown.units import (
     ANGLES,
     FORCES,
@@ -31,7 +32,6 @@ from strapdown.units import (
     TIME_UNITS,
 )
 
-Array = NDArray[np.float64]
 #: Unit of a table's column to the units accepted in a file, with their factors to it.
 UNITS: dict[str, Mapping[str, float]] = {
     "": {},

@@ -39,9 +39,7 @@ from strapdown.formats.writing import (
     write_numbers,
 )
 from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION, VELOCITY, places_of
-from strapdown.tables.checks import values_of
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, values_of
 
 DATA = "data.csv"
 #: What states frame and noise of a sensor beside its table, and its length at most, bytes.

@@ -35,11 +35,11 @@ from strapdown.formats.inference.conclusion import (
 )
 from strapdown.formats.recording import Origin
 from strapdown.tables.checks import RELATIVE as RELATIVE
+from strapdown.tables.checks import Array
 from strapdown.tables.on_disk import filled, let_go, step_range
 from strapdown.tables.sample_clock import sample_clock
 from strapdown.units import TIME_UNITS, factor_of
 
-Array = NDArray[np.float64]
 GPS, UNIX = "gps-seconds-of-week", "unix"
 WEEK = 604_800.0  # s
 YEAR = 365.25 * 86400.0  # s

@@ -25,8 +25,7 @@ from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.join import join
 from strapdown.formats.recording import NoStreamError, RawLog, TruthInSensorAxes
 from strapdown.formats.signs import Signs
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 POSES = ("global_pose", "global_pos")
 SENSORS = {

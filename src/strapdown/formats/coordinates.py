@@ -19,9 +19,7 @@ from strapdown.errors import DataError
 from strapdown.formats.arrays import numbers
 from strapdown.formats.find_columns import Found
 from strapdown.formats.recording import RawLog
-from strapdown.tables.checks import POSITION_SD, VELOCITY_SD
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import POSITION_SD, VELOCITY_SD, Array
 
 #: Quantities, their largest degrees, and the letters of their hemispheres, the negative one last.
 _ANGLES = {"lat": (90.0, "NS"), "lon": (180.0, "EW")}

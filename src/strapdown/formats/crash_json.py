@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.errors import DataError
 from strapdown.formats.crash_record import (
@@ -21,8 +20,7 @@ from strapdown.formats.crash_record import (
     unique,
 )
 from strapdown.formats.signs import Signs
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 FORMAT = "strapdown crash record"
 VERSION = 1

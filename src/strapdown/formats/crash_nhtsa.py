@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
@@ -27,9 +26,8 @@ from strapdown.formats.crash_record import (
 )
 from strapdown.formats.nhtsa import KINDS, Channel, CrashTest, Vehicle, read_nhtsa
 from strapdown.tables import imu_table
+from strapdown.tables.checks import Array
 from strapdown.units import find_unit, si_of
-
-Array = NDArray[np.float64]
 
 _CODES = tomllib.loads(Path(__file__).with_name("nhtsa_codes.toml").read_text(encoding="utf-8"))
 _SEATS, _OCCUPANT, _MOVING = (_CODES[table] for table in ("seats", "occupant", "moving"))

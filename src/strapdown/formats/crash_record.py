@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.tables import SAMPLINGS
-from strapdown.tables.checks import IMPOSSIBLE_FORCE, IMPOSSIBLE_RATE
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import IMPOSSIBLE_FORCE, IMPOSSIBLE_RATE, Array
 
 
 def _sample_row(sample: int) -> int:

@@ -14,9 +14,8 @@ from strapdown.formats.clocks import EPOCH
 from strapdown.formats.crash_record import CrashChannel
 from strapdown.formats.inference.conclusion import infer_time_unit
 from strapdown.formats.triad_units import what_numbers_say
+from strapdown.tables.checks import Array
 from strapdown.units import TIME_UNITS
-
-Array = NDArray[np.float64]
 
 DAY = 86_400.0  # s
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.errors import DataError
 from strapdown.formats import csv, nhtsa
@@ -34,9 +33,8 @@ from strapdown.formats.mme_reader import (
     even_stamps,
 )
 from strapdown.tables import ACCEL, EULER, GYRO, NED, POSITION_SD, VELOCITY
+from strapdown.tables.checks import Array
 from strapdown.units import GYRO_UNITS, si_of
-
-Array = NDArray[np.float64]
 
 NOVALUE = "NOVALUE"
 _DIMENSIONS = {

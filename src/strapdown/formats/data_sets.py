@@ -20,9 +20,7 @@ from strapdown.formats.known_formats import AXES, column, selected, stated_by, u
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
 from strapdown.formats.signs import Signs
 from strapdown.rotation import Q_NED_ENU
-
-Array = NDArray[np.float64]
-
+from strapdown.tables.checks import Array
 
 # Trials of BROAD (Laidig, Caruso, Cereatti, Seel, Data 2021 6(7):72), with optical truth.
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.formats import comma2k19, open_stream
@@ -34,7 +33,7 @@ from strapdown.formats.recording import RawLog
 from strapdown.formats.trajectory_readers import EARTH
 from strapdown.formats.vocabularies import FIXES
 from strapdown.frames import geodetic_from_ecef, geodetic_from_ned, geodetic_from_utm
-from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD, height_words
+from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD, Array, height_words
 from strapdown.tables.gnss import (
     LEAST_STEPS,
     SPEEDS_OF_OTHERS,
@@ -45,9 +44,6 @@ from strapdown.tables.gnss import (
 from strapdown.units import DATE_ORDERS, OF_TABLES, SPEEDS, TIME_UNITS, unit_of
 
 # GNSS fixes from tables with column names: text, Parquet.
-
-
-Array = NDArray[np.float64]
 
 
 def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:

@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.errors import DataError, Finding, add_note, add_warning
-from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK, Clock, leap_seconds
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.signs import Signs
-from strapdown.formats.text_columns import columns_at_once
+from strapdown.formats.text_columns import columns_at_once, decoded
 from strapdown.frames import geodetic_from_ecef, q_ne
+from strapdown.tables.checks import Array
 
-Array = NDArray[np.float64]
 #: Receivers of Emlid write it with the second ending, and without a line of names.
 SUFFIXES = (".pos", ".llh")
 #: RTKLIB's Q (1 fix, 2 float, 3 SBAS, 4 DGPS, 5 single, 6 PPP, 7 dead reckoning) to field 6 of
@@ -112,7 +111,7 @@ def _decoded(path: Path) -> tuple[str, list[Finding]]:
         raise DataError("io.file-empty-2", file=path.name)
     if data.startswith(codecs.BOM_UTF8):
         data = data[3:]
-    return csv.decoded(data, path.name)
+    return decoded(data, path.name)
 
 
 def _layout(lines: list[str], file: str, findings: list[Finding]) -> _Layout:

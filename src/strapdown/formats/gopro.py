@@ -32,7 +32,8 @@ from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.join import join
 from strapdown.formats.known_formats import from_json, lacking
 from strapdown.formats.recording import RawLog
-from strapdown.formats.signs import Signs, first_bytes, head
+from strapdown.formats.signs import Signs, first_bytes, head, json_beginning
+from strapdown.tables.checks import Array
 from strapdown.units import unit_of
 
 TITLE = "GoPro telemetry"
@@ -53,7 +54,6 @@ DAYS_2000 = 946_684_800.0  # 2000-01-01 in seconds since 1970
 _BRACKETS = re.compile(r"\(\s*([xyz])\s*,\s*([xyz])\s*,\s*([xyz])\s*\)", re.I)
 # The order of HERO5, as its streams are named.
 _WORDS = {"up/down": "z", "right/left": "x", "forward/back": "y"}
-Array = NDArray[np.float64]
 
 
 @dataclass
@@ -75,7 +75,10 @@ def _has_telemetry(path: Path) -> bool:
     if first[:4] == b"DEVC" or first[4:] == b"ftyp":
         return first[:4] == b"DEVC" or telemetry_of(path) is not None
     text = head(path, 4096) if path.suffix.lower() == ".json" else ""
-    return text.lstrip().startswith("{") and '"streams"' in text and '"samples"' in text
+    devices, _ = json_beginning(text.lstrip())
+    return isinstance(devices, dict) and any(
+        isinstance(device, dict) and "streams" in device for device in devices.values()
+    )
 
 
 # Text in UTF-16 too.

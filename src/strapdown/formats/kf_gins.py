@@ -21,6 +21,7 @@ from strapdown.formats.clocks import GPS, WEEK, Clock, clock_of, unrolled, with_
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import HEAD, Signs, first_bytes
+from strapdown.formats.text_columns import is_data
 from strapdown.formats.triad_units import intervals
 from strapdown.formats.writing import (
     SECOND,
@@ -35,9 +36,8 @@ from strapdown.formats.writing import (
     write_numbers,
 )
 from strapdown.tables import ACCEL, GYRO, TRAJECTORY, check_trajectory, trajectory_table
-from strapdown.tables.checks import MAG, POSITION_SD, VELOCITY_SD, index_of, values_of
+from strapdown.tables.checks import MAG, POSITION_SD, VELOCITY_SD, Array, index_of, values_of
 
-Array = NDArray[np.float64]
 COLUMNS = ["time", *(f"dtheta_{a}" for a in "xyz"), *(f"dv_{a}" for a in "xyz")]
 SUFFIXES = (*csv.SUFFIXES, ".imu")
 FOLDER_TITLE = "folder of KF-GINS: increments, fixes, trajectory"
@@ -152,7 +152,7 @@ def _begins_with_fixes(path: Path) -> bool:
     if not lines or len(lines[0]) not in (len(NAMES), len(WITH_VELOCITY)):
         return False
     signed = sum(any(f.startswith(b"-") for f in line[4:7]) for line in lines)
-    return 2 * signed <= len(lines) and all(csv.is_data(f.decode("latin-1")) for f in lines[0])
+    return 2 * signed <= len(lines) and all(is_data(f.decode("latin-1")) for f in lines[0])
 
 
 detect_fixes = Signs(

@@ -50,9 +50,7 @@ from strapdown.formats.writing import (
 from strapdown.frames import ecef_from_geodetic, q_ne
 from strapdown.tables import ACCEL, GYRO, VELOCITY, places_of, trajectory_table
 from strapdown.tables import EULER as ANGLES
-from strapdown.tables.checks import values_of
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, values_of
 
 TITLE = "KITTI raw, folder oxts"
 FIELDS = 30

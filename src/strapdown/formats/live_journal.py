@@ -48,8 +48,6 @@ from strapdown.formats.signs import Signs, first_bytes
 from strapdown.tables import GEODETIC, GNSS, VELOCITY
 from strapdown.tables.checks import POSITION_SD, VELOCITY_SD
 
-Array = NDArray[np.float64]
-
 JOURNAL, RUN = "journal", "run.json"
 SCHEMA = "strapdown journal 1"
 MAGIC = f"{SCHEMA}\n".encode()

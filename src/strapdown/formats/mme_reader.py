@@ -10,10 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding, add_note, add_warning
-from strapdown.formats import csv
 from strapdown.formats.crash_record import (
     CHANGE_NOTE,
     DEFORMS,
@@ -27,7 +25,9 @@ from strapdown.formats.crash_record import (
     unique,
 )
 from strapdown.formats.mme_codes import DIMENSIONS, DUMMIES, NO_CLASS, MmeCode, decode_mme
+from strapdown.formats.text_columns import decoded
 from strapdown.tables import SAMPLINGS
+from strapdown.tables.checks import Array
 from strapdown.units import FACTORS, OF_CRASHES, TIME_UNITS, find_unit
 
 MOST_FILES = 20_000
@@ -320,9 +320,6 @@ def _told(file: MmeFile, listed: dict[int, str]) -> list[Finding]:
 
 
 # Channel files of ISO MME: header with the channel code, samples and stamps.
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -660,7 +657,7 @@ def text_of(path: Path, longest: int = LARGEST) -> str:
         data = stream.read(longest)
     if len(data) == longest:
         data = data[: data.rfind(b"\n") + 1]
-    text = csv.decoded(data, path.name)[0]
+    text = decoded(data, path.name)[0]
     if "\0" in text:
         raise DataError("io.mme-with-zero-bytes", file=path.name)
     return text

@@ -25,9 +25,7 @@ from strapdown.formats.signs import Signs, first_bytes
 from strapdown.frames import C_ne, geodetic_from_ecef
 from strapdown.parsers import parse
 from strapdown.parsers.recorders import UBX_SYNC, ubx_frames
-
-Array = NDArray[np.float64]
-
+from strapdown.tables.checks import Array
 
 # Streams of u-blox receivers (``.ubx``), alone or mixed with NMEA and RTCM, by pyubx2.
 #

@@ -97,6 +97,8 @@ class ReadOptions:
     axes : str, optional
         Which sensor axis points forward, right, down: ``x,-y,-z`` for a sensor whose axes
         point forward, left, up.
+    axes_by_gravity : bool
+        Turn axes that nothing states so that gravity points down.
     sampling : str, optional
         ``instantaneous`` or ``mean``.
     rate : float, optional, Hz
@@ -122,6 +124,7 @@ class ReadOptions:
     format: str | None = None
     calibration: str | None = None
     inferred: frozenset[str] = frozenset()
+    axes_by_gravity: bool = False
 
     def why(self, key: str) -> str:
         """Say whose statement a unit or a column is."""

@@ -43,7 +43,8 @@ from strapdown.formats.sensor_folder import (
     members_of,
     peek,
 )
-from strapdown.formats.signs import Signs, head
+from strapdown.formats.signs import Signs, head, json_beginning
+from strapdown.formats.text_columns import decoded
 
 TIME = ("time", "ns")
 GYROS = ("Gyroscope", "GyroscopeUncalibrated")
@@ -78,8 +79,10 @@ _COPY = re.compile(r"[\s_-]*(\(\d+\)|\d+)$")
 def _has_sensor(path: Path) -> bool:
     """Whether a table, or one in a folder or an archive, has the header of a sensor."""
     if path.suffix.lower() == ".json" and path.is_file():
-        text = head(path, 4096)
-        return text.lstrip().startswith("[") and '"sensor"' in text
+        records, _ = json_beginning(head(path, 4096).lstrip())
+        return isinstance(records, list) and any(
+            isinstance(record, dict) and "sensor" in record for record in records
+        )
     members = peek(path) if is_container(path) else [file_member(path)]
     return any(
         (_sensor(m) in SENSORS and _has_columns(m, "x", "y", "z"))
@@ -191,7 +194,7 @@ def _require(name: str, columns: dict[str, NDArray[Any]]) -> None:
 
 
 def _records(path: Path) -> tuple[list[dict[str, Any]], list[Finding]]:
-    text, found = csv.decoded(path.read_bytes(), path.name)
+    text, found = decoded(path.read_bytes(), path.name)
     try:
         records = json.loads(text)
     except json.JSONDecodeError as error:

@@ -7,6 +7,7 @@ a function of the format is called only where the signs leave it open.
 from __future__ import annotations
 
 import itertools
+import json
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -121,3 +122,37 @@ def text_of(data: bytes) -> str:
     if data.startswith(_WIDE):
         return data.decode("utf-16", "replace")
     return data.partition(b"\0")[0].decode("utf-8-sig", "replace")
+
+
+# Strings, brackets and commas of JSON.
+_JSON = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{},]')
+
+
+@lru_cache(maxsize=2)
+def json_beginning(text: str) -> tuple[Any, int]:
+    """Parse the first value of a text in JSON, of which the end may be missing or damaged.
+
+    Returns the value, or its part before the damage, and the length of a whole one, or else 0. None
+    if the text does not begin with a list or an object.
+    """
+    closing, sound = {"[": "]", "{": "}"}, 0
+    if text[:1] not in closing:
+        return None, 0
+    try:
+        return json.JSONDecoder().raw_decode(text)
+    except json.JSONDecodeError as error:
+        sound = error.pos
+    except (RecursionError, ValueError):  # or an integer of 4,301 digits
+        return None, 0
+    open_, end, closers = "", 0, ""
+    for m in _JSON.finditer(text, 0, sound):
+        if m[0] in closing:
+            open_ = closing[m[0]] + open_
+        elif m[0] in "]}":
+            open_ = open_[1:]
+        if len(m[0]) == 1:
+            end, closers = m.start() if m[0] == "," else m.end(), open_
+    try:
+        return json.loads(text[:end] + closers), 0
+    except (RecursionError, ValueError):
+        return None, 0

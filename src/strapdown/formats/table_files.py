@@ -6,7 +6,6 @@ import csv as text_csv
 import dataclasses
 import io
 import json
-import re
 import tempfile
 from datetime import datetime, time
 from pathlib import Path, PurePosixPath
@@ -27,7 +26,8 @@ from strapdown.formats.known_formats import from_json, under
 from strapdown.formats.phone_apps import with_force_summed
 from strapdown.formats.recording import RawLog
 from strapdown.formats.sensor_folder import first_line, peek
-from strapdown.formats.signs import Signs, first_bytes, head
+from strapdown.formats.signs import Signs, first_bytes, head, json_beginning
+from strapdown.formats.text_columns import NUMBER, decoded, fields_of
 from strapdown.formats.vocabularies import FIXES
 from strapdown.parsers import parse
 from strapdown.parsers.archives import PACKED, numpy_array
@@ -88,7 +88,7 @@ def _holds_one(path: Path) -> bool:
     if len(members) != 1 or read_name(f"{members[0].stem} x").quantity is not None:
         return False  # of one sensor, which `sensor_folder` reads
     line = first_line(members[0])
-    return line[:1] in tuple("[{") or len(csv.fields_of(line, csv.separator_of(line))) > 3
+    return line[:1] in tuple("[{") or len(fields_of(line)) > 3
 
 
 detect_packed = Signs(also=_holds_one)
@@ -148,47 +148,69 @@ DEEP, PARTS = 6, 16
 LONG_BLOCK = 1.5
 
 
-#: A list of sensors before the list of their values, as Edge Impulse has them (data acquisition
-#: format): ``"sensors": [{"name": "accX", "units": "m/s2"}, …], "values": [[…], …]``.
-_APART = re.compile(r'"sensors"\s*:\s*\[\s*\{[^\[\]]*\}\s*\]\s*,\s*"values"\s*:\s*\[')
-#: An object of which one member is the list of the objects: ``{"locations": [{…``.
-_MEMBER = re.compile(
-    r'\{\s*(?:"\w+"\s*:\s*(?:"[^"]*"|[-\w.]+|\{[^{}\[\]]*\})\s*,\s*)*"\w+"\s*:\s*\[\s*\{'
-)
+def _form(text: str) -> str:
+    """Return how the beginning of a text in JSON holds samples, or an empty text.
+
+    ``objects`` or ``rows`` of values: in a list. ``apart``: sensors and their values, as Edge
+    Impulse has them (data acquisition format), ``"sensors": [{"name": "accX", "units": "m/s2"}, …],
+    "values": [[…], …]``. ``columns``: members of an object, ``{"time": [0.0, …``, or as pandas
+    writes a table. ``member``: objects in the first list of an object, ``{"locations": [{…``.
+    ``nested``: columns, or rows under a list of names, in an object in an object.
+    """
+    value, end = json_beginning(text)
+    if isinstance(value, list):
+        first = value[0] if value else None
+        return "objects" if isinstance(first, dict) else "rows" if _begins_plain(first) else ""
+    if not isinstance(value, dict):
+        return ""
+    held = value.get("payload")
+    held = held if isinstance(held, dict) else value
+    sensors = held.get("sensors")
+    of_words = isinstance(sensors, list) and bool(sensors) and isinstance(sensors[0], dict)
+    if of_words and _begins_plain(held.get("values")):
+        return "apart"
+    lines = end > 0 and text[end:].lstrip().startswith("{")
+    parts = [v for v in value.values() if _is_part(v)]
+    deep = (v for v in parts if isinstance(v, list) or any(map(_is_part, v.values())))
+    if isinstance(first := next(deep, None), list) and first and isinstance(first[0], dict):
+        return "" if lines else "member"
+    part = parts[0] if parts else None
+    if "0" in part if isinstance(part, dict) else _begins_plain(part):
+        # Of lines of objects, a list is of the parts of a vector: one object of a line alone has
+        # longer ones, or numbers its samples.
+        if not end or "\n" in text[:end]:
+            return "columns"
+        long = any("0" in v if isinstance(v, dict) else len(v) > PARTS for v in parts)
+        return "columns" if long and not text[end:].strip() else ""
+    whole = isinstance(part, list)
+    while isinstance(part, dict):
+        part = next(filter(_is_part, part.values()), None)
+    if whole or not part or part[0] is None or lines:
+        return ""
+    return "nested"
 
 
-#: An object whose members are columns: ``{"time": [0.0, …``, or as pandas writes a table.
-_BY_COLUMNS = re.compile(
-    r'\{\s*(?:"[^"]*"\s*:\s*(?:"[^"]*"|-?[\d.eE+]+)\s*,\s*)*'
-    r'"[^"]*"\s*:\s*(?:\[\s*(?:\[\s*)?["\d-]|\{\s*"0"\s*:)'
-)
+def _is_part(value: Any) -> bool:
+    return isinstance(value, dict | list)
 
 
-#: An object in an object whose members are columns, or rows under a list of names; rows alone.
-_NESTED = re.compile(
-    r'\{\s*(?:"[^"]*"\s*:\s*(?:"[^"]*"|[-\w.+]+)\s*,\s*)*"[^"]*"\s*:\s*\{\s*'
-    r'(?:"[^"]*"\s*:\s*(?:"[^"]*"|[-\w.+]+|\{)\s*,?\s*)*"[^"]*"\s*:\s*\[\s*["\d\[{-]'
-)
-_ROWS = re.compile(r'\[\s*\[\s*["\d-]')
-
-
-def _is_object(line: str) -> bool:
-    try:
-        return isinstance(json.loads(line), dict)
-    except (ValueError, RecursionError):
-        return False
+def _begins_plain(value: Any) -> bool:
+    """Whether a list begins with a number or a word, or with a list that does."""
+    first = value[0] if isinstance(value, list) and value else None
+    first = first[0] if isinstance(first, list) and first else first
+    return isinstance(first, str | int | float)
 
 
 def _begins(path: Path) -> bool:
     """Whether an object is at the beginning."""
     text = head(path).lstrip()
-    if path.suffix.lower() in JSON_SUFFIXES[:1] and text.startswith("["):
-        return text[1:].lstrip().startswith("{") or _ROWS.match(text) is not None
-    if path.suffix.lower() in JSON_SUFFIXES[:1] and _NESTED.match(text):
+    form = _form(text)
+    if path.suffix.lower() in JSON_SUFFIXES[:1] and form in ("objects", "rows", "nested"):
         return True
-    if _APART.search(text) or _MEMBER.match(text) or _is_by_columns(text):
+    if form in ("apart", "member", "columns"):
         return True
-    return _is_object(text.partition("\n")[0])
+    value, end = json_beginning(text)
+    return isinstance(value, dict) and end > 0 and "\n" not in text[:end]
 
 
 detect_json = Signs(suffixes=(*JSON_SUFFIXES, ".txt", ".log"), text=r"\A\s*+[\[{]", also=_begins)
@@ -196,12 +218,12 @@ detect_json = Signs(suffixes=(*JSON_SUFFIXES, ".txt", ".log"), text=r"\A\s*+[\[{
 
 def read_json_table(path: Path) -> RawLog:
     """Read the members of the objects as columns, missing ones as NaN."""
-    if _APART.search(head(path)):
+    form, whole = _form(head(path).lstrip()), None
+    if form == "apart":
         return _names_apart(path)
-    top, whole = head(path).lstrip(), None
-    if _is_by_columns(top) or _ROWS.match(top):
+    if form in ("columns", "rows"):
         return _by_columns(path)
-    if (_NESTED.match(top) or _MEMBER.match(top)) and "}\n{" not in top:
+    if form in ("member", "nested"):
         whole = from_json(path)
         content = _unwrapped(whole)
         if parts := _sensors_apart(content):
@@ -210,7 +232,7 @@ def read_json_table(path: Path) -> RawLog:
             lists = [v for v in content.values() if isinstance(v, list)]
             if not all(v and isinstance(v[0], dict) for v in lists):
                 return _of_columns(path, content)
-    objects, rows, findings = _objects(path, whole)
+    objects, rows, findings = _objects(path, whole if form == "member" else None)
     if blocks := _of_blocks(objects):
         return _joined_blocks(path, blocks, findings)
     kind = next(
@@ -237,32 +259,12 @@ def read_json_table(path: Path) -> RawLog:
 
 def read_json_fixes(path: Path) -> RawLog:
     """Read the object of fixes of an object of sensors; the whole table of any other file."""
-    top = head(path).lstrip()
-    if (_NESTED.match(top) or _MEMBER.match(top)) and "}\n{" not in top:
+    if _form(head(path).lstrip()) in ("member", "nested"):
         for name, columns in _sensors_apart(_unwrapped(from_json(path))).items():
             if {"lat", "lon"} <= {read_name(n, FIXES).quantity for n in columns}:
                 arrays = {n: _array_of(values) for n, values in columns.items()}
                 return RawLog(f"{path.name}/{name}", (path,), arrays)
     return read_json_table(path)
-
-
-def _is_by_columns(text: str) -> bool:
-    """Whether the beginning of a text is that of one object of columns.
-
-    Of lines of objects, a list is of the parts of a vector: one object of a line alone has longer
-    ones, or numbers its samples.
-    """
-    if _BY_COLUMNS.match(text) is None or _MEMBER.match(text):
-        return False
-    first, _, rest = text.partition("\n")
-    try:
-        one = json.loads(first)
-    except (ValueError, RecursionError):
-        return True
-    return not rest.strip() and any(
-        (isinstance(v, list) and len(v) > PARTS) or (isinstance(v, dict) and "0" in v)
-        for v in one.values()
-    )
 
 
 def _by_columns(path: Path) -> RawLog:
@@ -485,10 +487,12 @@ def _names_apart(path: Path) -> RawLog:
 def _objects(
     path: Path, whole: Any = None
 ) -> tuple[list[dict[str, Any]], list[int], list[Finding]]:
-    """Return the objects, each with its line or its number in the list; `whole`: parsed before."""
-    text, findings = csv.decoded(path.read_bytes(), path.name)
-    inside = _MEMBER.match(text.lstrip()) and "}\n{" not in text
-    if text.lstrip().startswith("[") or inside:
+    """Return the objects, each with its line or its number in the list.
+
+    `whole`: an object of which the first list has them, parsed before.
+    """
+    text, findings = decoded(path.read_bytes(), path.name)
+    if text.lstrip().startswith("[") or whole is not None:
         content = from_json(path) if whole is None else whole
         if isinstance(content, dict):
             content = next((v for v in content.values() if isinstance(v, list)), [])
@@ -572,7 +576,7 @@ detect_labview = Signs(text=rf"\A{LABVIEW_MAGIC}")
 
 def read_labview_table(path: Path) -> RawLog:
     """Read the channels, with the units that the header states."""
-    text, _ = csv.decoded(path.read_bytes(), path.name)
+    text, _ = decoded(path.read_bytes(), path.name)
     lines = text.split("\n")
     ends = [k for k, line in enumerate(lines) if line.startswith(END)]
     if len(ends) != 2 or len(lines) < ends[1] + 3:
@@ -589,7 +593,7 @@ def read_labview_table(path: Path) -> RawLog:
         raw.units |= dict(zip(channels, units, strict=True))
     raw.units |= {"time": "s"} if "time" in raw.columns else {}
     step = next(iter(said.get("Delta_X", ())), "").replace(",", ".")
-    stated = csv.NUMBER.fullmatch(step) is not None and 1e-9 < float(step) < 1e9
+    stated = NUMBER.fullmatch(step) is not None and 1e-9 < float(step) < 1e9
     if "time" not in raw.columns and stated:
         raw.rate = 1.0 / float(step)
     return raw

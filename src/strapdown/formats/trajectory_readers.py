@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.dsp.samples import running_integral
 from strapdown.errors import DataError, Finding
@@ -20,10 +19,7 @@ from strapdown.formats.recording import RawLog
 from strapdown.formats.vocabularies import TRAJECTORIES
 from strapdown.rotation import within_half_turn
 from strapdown.tables import EULER, VELOCITY, trajectory_table
-from strapdown.tables.checks import HEIGHTS_AS_STATED
-
-Array = NDArray[np.float64]
-
+from strapdown.tables.checks import HEIGHTS_AS_STATED, Array
 
 #: Level of the heights, in the comments of a trajectory: that of the fixes.
 AS_STATED = "as the fixes state them"

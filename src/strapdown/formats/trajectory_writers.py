@@ -39,6 +39,7 @@ from strapdown.tables import (
     check_trajectory_error,
     places_of,
 )
+from strapdown.tables.checks import Array
 from strapdown.tables.on_disk import let_go, parts_of
 
 #: Decimals of time, latitude, longitude, height, velocity and attitude, for fixed digits.
@@ -198,9 +199,6 @@ def write_parquet(
 
 
 # Trajectories for maps, thinned and split at the date line.
-
-
-Array = NDArray[np.float64]
 
 
 def write_geojson(path: Path, trajectory: pd.DataFrame, options: FileOptions | None = None) -> None:

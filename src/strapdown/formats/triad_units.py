@@ -438,6 +438,12 @@ def body_axes(log: LogInUse) -> Axes:
             if axis == "-z":
                 data = {"percent": percent, "probability": up.confidence}
                 log.note("io.axes-not-stated", "axes", data=data)
+            elif options.axes_by_gravity:
+                example = _EXAMPLES[axis]
+                data = {"axes": example, "up": axis, "percent": percent}
+                log.note("attitude.axes-by-gravity", "axes", data=data)
+                log.options = replace(options, axes=example)
+                return body_axes(log)
             else:
                 code = {"z": "io.axes-not-stated-z-up", "y": "io.axes-not-stated-y-up"}.get(axis)
                 log.warn(

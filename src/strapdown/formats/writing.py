@@ -33,6 +33,7 @@ from strapdown.tables.checks import (
     POSITION_SD,
     VELOCITY,
     VELOCITY_SD,
+    Array,
     height_words,
     values_of,
 )
@@ -159,7 +160,6 @@ class FileOptions:
 # Tables as their files have them.
 
 
-Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 #: Streams by their names (`formats.STREAMS`).
 Tables = Mapping[str, pd.DataFrame]

@@ -24,7 +24,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.config.navigation import AidSpec
 from strapdown.errors import ConfigError, Finding
@@ -40,21 +39,6 @@ from strapdown.tables.checks import POSITION_SD, VELOCITY_SD
 
 if TYPE_CHECKING:
     from strapdown.live.journal import SpooledRows
-
-__all__ = [
-    "END",
-    "LINE_FORMS",
-    "AidRows",
-    "BadLineError",
-    "Measured",
-    "Sample",
-    "StateLines",
-    "Word",
-    "check_token",
-    "count_unused",
-    "parse_line",
-]
-
 
 #: Command that ends a run.
 END = "end"
@@ -232,7 +216,6 @@ def _shown(text: str) -> str:
 # Measurements received line by line: as rows of a table, and all rows as a file.
 
 
-Array = NDArray[np.float64]
 _UNITS_OF_FIXES = {
     **dict(zip(GEODETIC, ("deg", "deg", "m"), strict=True)),
     **dict.fromkeys(POSITION_SD, "m"),

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import CommandTable, LiveTable, NavigationSpec
@@ -38,10 +37,7 @@ from strapdown.navigation.modes import PipelineChunk
 from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.replay import Recording
 from strapdown.systems.alignment_source import axes_matrices
-
-__all__ = ["Reception"]
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 #: Samples in a row that confirm a gap: without a delay of the states from 50 Hz on, as `hold_s`
 #: is 0.2 s by default. So many older stamps in a row are a clock that went back.

@@ -9,7 +9,7 @@ from typing import NoReturn
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown._kernels import sample as kernel
 from strapdown._kernels.compilation import ARGUMENT_ERRORS
@@ -30,6 +30,7 @@ from strapdown.tables import (
     check_sampling_kind,
 )
 from strapdown.tables.checks import (
+    Array,
     check_columns,
     check_rows,
     check_steps,
@@ -40,8 +41,6 @@ from strapdown.tables.checks import (
     source_of,
     values_of,
 )
-
-Array = NDArray[np.float64]
 
 # A step with a larger rotation, rad, is poorly described by its samples.
 LARGEST_STEP_ROTATION = 1.0

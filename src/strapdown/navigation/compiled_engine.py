@@ -7,7 +7,6 @@ from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown._kernels import filter_loop as kernel
 from strapdown._kernels import robust
@@ -36,10 +35,7 @@ from strapdown.nav_state import NavState
 from strapdown.navigation.engine import LARGEST_GROUP, SAME_INSTANT, Engine, EngineState, NodeRows
 from strapdown.navigation.measurements.gnss import POSITION_CODE
 from strapdown.navigation.measurements.measurement import Epochs
-
-__all__ = ["CompiledEngine", "ReferenceEngine", "compiled"]
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # Exactly these types: a subclass may behave differently.
 MECHANIZATIONS: dict[type[Mechanization], int] = {NorthEastDown: NED, WanderAzimuth: WANDER}

@@ -20,26 +20,7 @@ from strapdown.dsp.chi_square import (
 )
 from strapdown.errors import ConfigError, Finding
 from strapdown.navigation.record import innovation_labels
-
-__all__ = [
-    "GROSS",
-    "Alarm",
-    "ComponentConsistency",
-    "Inconsistency",
-    "InnovationMonitor",
-    "MonitorState",
-    "ObservationConsistency",
-    "Verdict",
-    "consistency_of",
-    "consistency_of_all",
-    "gross_of",
-    "inconsistencies",
-    "judge",
-    "whiteness",
-]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 #: An innovation beyond so many standard deviations, of those that are usual in the run, is a gross
 #: error: one in two million normal ones.

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown._kernels.filter_loop import BEYOND
 from strapdown._kernels.smoothing import (
@@ -30,18 +29,7 @@ from strapdown.errors import DivergenceError, Finding
 from strapdown.estimation.covariance import Innovations, Observation
 from strapdown.estimation.error_filter import ErrorFilter, FilterState, Rules
 from strapdown.estimation.error_model import PHYSICAL
-
-__all__ = [
-    "LARGEST_GROUP",
-    "Engine",
-    "EngineState",
-    "GeneralEngine",
-    "LostCovarianceError",
-    "NodeRows",
-]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 #: An epoch this close to the end of a step counts as at the end, s: time stamps are rounded decimal
 #: fractions.

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment, Site
@@ -33,21 +32,7 @@ from strapdown.navigation.record import NavigationRecord
 from strapdown.rotation import euler_sd
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import GEODETIC, GYRO, VELOCITY
-from strapdown.tables.checks import index_of, values_of
-
-__all__ = [
-    "SHORTEST",
-    "Compass",
-    "Manoeuvre",
-    "compasses_of",
-    "manoeuvres_from",
-    "north_within",
-    "sd_after",
-    "seen_rests",
-]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, values_of
 
 #: Two-sided 99 % quantiles of Student's t, with one degree of freedom to three.
 STUDENT = (63.656741162872, 9.924843200918, 5.840909309733)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment, Site
@@ -52,28 +52,11 @@ from strapdown.tables import (
     usable,
 )
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
-from strapdown.tables.checks import index_of, source_of, values_of
+from strapdown.tables.checks import Array, index_of, source_of, values_of
 
 if TYPE_CHECKING:
     from strapdown.navigation.pipeline import NavigationPipeline, PipelineState
 
-__all__ = [
-    "align",
-    "errors_by_antenna",
-    "fixes_until",
-    "from_alignment",
-    "from_fine",
-    "from_state",
-    "handed_over",
-    "here_by_fix",
-    "motion_by_fixes",
-    "rest_by_fixes",
-    "site_of_fixes",
-    "unused_fixes",
-]
-
-
-Array = NDArray[np.float64]
 
 # Rows of the displacement in the covariance of an alignment that estimates the position.
 PLACE = slice(39, 42)

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown._kernels.attitude import quaternion_advance
@@ -56,20 +55,7 @@ from strapdown.navigation.record import (
 from strapdown.rotation import euler_sd
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import EULER, TRAJECTORY, on_disk
-from strapdown.tables.checks import index_of, values_of, view_of
-
-__all__ = [
-    "LONGEST",
-    "UNSEEN",
-    "HeadingChecks",
-    "agreeing_sources",
-    "carry_headings",
-    "heading_checks_of",
-    "run_heading_checks",
-]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, values_of, view_of
 
 #: Standard deviation of a practically unknown heading, deg; linearization fails beyond it.
 UNKNOWN = 20.0

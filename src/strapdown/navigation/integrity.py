@@ -60,21 +60,7 @@ from strapdown.navigation.recorder import IntervalRecorder
 from strapdown.navigation.replay import PipelineRun, run_batch
 from strapdown.progress import Progress
 from strapdown.tables import POSITION_SD, TRAJECTORY, VELOCITY_SD
-from strapdown.tables.checks import index_of, values_of, view_of
-
-__all__ = [
-    "Advice",
-    "IntegrityReport",
-    "QuantityIntegrity",
-    "Repeated",
-    "assess_integrity",
-    "likelihood_gain",
-    "quantity_status",
-    "repeat_without",
-]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, values_of, view_of
 
 #: Most spans with advice, and their least length, s.
 MOST_ADVISED, LEAST_ADVISED = 4, 5.0

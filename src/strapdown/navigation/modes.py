@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment, CoarseAlignment
 from strapdown.alignment.fine import FineAlignment, FineResult
@@ -15,20 +14,7 @@ from strapdown.errors import ConfigError
 from strapdown.nav_state import NavState
 from strapdown.navigation.record import Event, NavigationChunk, Span
 from strapdown.rotation import euler_from_quaternion
-from strapdown.tables.checks import is_number
-
-__all__ = [
-    "Aligned",
-    "CoarseMode",
-    "Command",
-    "FineMode",
-    "KnownStart",
-    "Mode",
-    "Navigation",
-    "PipelineChunk",
-    "Until",
-    "check_timeline",
-]
+from strapdown.tables.checks import Array, is_number
 
 
 @dataclass(frozen=True)
@@ -182,7 +168,6 @@ def check_timeline(modes: tuple[Mode, ...], known_start: bool) -> None:
 # Navigation from a known state, without an alignment.
 
 
-Array = NDArray[np.float64]
 Three = tuple[float, float, float]
 
 

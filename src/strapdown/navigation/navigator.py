@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown._kernels.filter_loop import ASK, NOTE, turn_blocks
 from strapdown._kernels.motion_increments import split_increment
@@ -73,14 +72,10 @@ from strapdown.navigation.record import (
 from strapdown.navigation.recovery import Wrong
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty
+from strapdown.tables.checks import Array
 
 if TYPE_CHECKING:
     from strapdown.navigation.smoother import RauchTungStriebel
-
-__all__ = ["EpochLoop", "Navigator", "NavigatorState", "Reference", "with_states"]
-
-
-Array = NDArray[np.float64]
 
 
 #: A warming unit is told of at intervals of this part of the time since it was switched on, and of

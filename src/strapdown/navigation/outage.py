@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.dsp.chi_square import plane_bound
 from strapdown.estimation.error_filter import symmetric
@@ -19,23 +18,7 @@ from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.navigation.record import NavigationChunk
 from strapdown.navigation.recorder import record_of
 from strapdown.progress import Progress, silent
-
-__all__ = [
-    "QUANTITIES",
-    "Forecast",
-    "Go",
-    "Share",
-    "Source",
-    "courses",
-    "covariance_over",
-    "forecast",
-    "scaled",
-    "sources_of",
-    "variances",
-]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 #: Runs a navigator from a state over the samples of an outage.
 Go = Callable[[Navigator, NavigatorState], Sequence[NavigationChunk]]

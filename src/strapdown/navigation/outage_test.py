@@ -28,29 +28,7 @@ from strapdown.navigation.smoother import Smoothing
 from strapdown.navigation.truth_comparison import compare_with_truth
 from strapdown.progress import Progress
 from strapdown.tables import ACCEL, GYRO
-from strapdown.tables.checks import index_of, source_of, values_of
-
-__all__ = [
-    "IMPROBABLE",
-    "SETTLED",
-    "OutageVerdict",
-    "Withheld",
-    "WithheldRun",
-    "WithheldScore",
-    "Withholding",
-    "blinded",
-    "end_of_what_tells",
-    "judge_outages",
-    "score_by_truth",
-    "score_of",
-    "score_of_smoothed",
-    "score_withholding",
-    "spans_to_withhold",
-    "withheld_runs",
-]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, source_of, values_of
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Site
 from strapdown.errors import ConfigError, DataError, DivergenceError, check_choice
@@ -36,16 +35,7 @@ from strapdown.navigation.preprocessing import (
 )
 from strapdown.navigation.record import Event, GrowingRows, InnovationRecord, NavigationChunk, Span
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.tables.checks import is_number
-
-__all__ = [
-    "MeasurementMonitor",
-    "MeasurementMonitorState",
-    "ModeSequencer",
-    "NavigationPipeline",
-    "PipelineState",
-]
-
+from strapdown.tables.checks import Array, is_number
 
 # Monitor measurements: outages, recoveries, rejected and late observations.
 
@@ -247,7 +237,6 @@ def _out(name: str, at: float, newest: float) -> Event:
     return Event.of(at, "outage", "outage", name=name, since=newest)
 
 
-Array = NDArray[np.float64]
 Three = tuple[float, float, float]
 
 #: Columns of a step kept for an alignment: time, six values, ten increments.

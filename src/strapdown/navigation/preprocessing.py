@@ -9,7 +9,6 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown._kernels.level import Q_LB
@@ -24,26 +23,8 @@ from strapdown.prefilter.prefilter import CHANNELS, Grid, Portion, Prefilter
 from strapdown.sensors.saturation import ROUNDING
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
-from strapdown.tables.checks import index_of, is_number, values_of
+from strapdown.tables.checks import Array, index_of, is_number, values_of
 from strapdown.tables.on_disk import let_go
-
-__all__ = [
-    "NEAR",
-    "FilteringState",
-    "GapPolicy",
-    "Hole",
-    "ImuIncrements",
-    "ImuPreprocessor",
-    "ImuPreprocessorState",
-    "RangeEnds",
-    "RangeState",
-    "ends_of",
-    "hole_between",
-    "joined_steps",
-    "steps_of",
-    "widened",
-]
-
 
 # The steps of a record, unchanged or joined to tenths of a second.
 
@@ -426,8 +407,6 @@ def ends_of(sensors: ImuUncertainty) -> RangeEnds | None:
         slack = np.where(np.isfinite(full), np.maximum(step, ROUNDING * full), 0.0)
     return RangeEnds(full - slack, np.where(np.isfinite(full), full + slack, 0.0))
 
-
-Array = NDArray[np.float64]
 
 #: Number of first samples that give the usual step of a record.
 FIRST = 64

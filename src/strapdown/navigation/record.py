@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, overload
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.errors import Finding
 from strapdown.estimation.covariance import Innovations, Observation
@@ -20,26 +20,7 @@ from strapdown.tables import (
     check_trajectory_error,
     on_disk,
 )
-from strapdown.tables.checks import as_array
-
-__all__ = [
-    "CovarianceSnapshot",
-    "CovarianceSnapshots",
-    "Event",
-    "GrowingRows",
-    "InnovationColumns",
-    "InnovationRecord",
-    "InnovationRecords",
-    "NavigationChunk",
-    "NavigationRecord",
-    "Span",
-    "innovation_labels",
-    "standard_deviations",
-    "state_of_row",
-]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, as_array
 
 
 @dataclass(frozen=True)

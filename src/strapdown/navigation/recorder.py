@@ -27,15 +27,12 @@ from strapdown.navigation.record import (
     standard_deviations,
 )
 from strapdown.tables import EULER, TRAJECTORY, check_trajectory, on_disk
-from strapdown.tables.checks import is_number, view_of
+from strapdown.tables.checks import Array, is_number, view_of
 
 if TYPE_CHECKING:
     from strapdown.mechanization.mechanization import Mechanization
     from strapdown.navigation.smoother import Smoothed, Smoothing
 
-__all__ = ["RECORDERS", "FullRecorder", "IntervalRecorder", "Recorder", "Tape", "record_of"]
-
-Array = NDArray[np.float64]
 
 # A time stamp within this fraction of the interval counts as on the grid.
 NEAR = 1e-6

@@ -17,11 +17,7 @@ from strapdown.frames import place_difference
 from strapdown.navigation.measurements.gnss import PLACE, SPEED
 from strapdown.navigation.record import innovation_labels
 from strapdown.tables import GEODETIC
-from strapdown.tables.checks import index_of, values_of
-
-__all__ = ["Wrong", "longest", "wrong_stretches"]
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, values_of
 
 #: Parts of a stretch after which its noise is told of.
 PARTS = 20

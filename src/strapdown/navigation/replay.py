@@ -9,7 +9,6 @@ from functools import partial
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DivergenceError
@@ -23,19 +22,6 @@ from strapdown.progress import Progress, silent
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO, check_imu, on_disk
 from strapdown.tables.checks import check_columns, source_of, values_of
-
-__all__ = [
-    "PipelineRun",
-    "Recording",
-    "pieces_by_sample",
-    "pieces_of",
-    "relinearized",
-    "run_batch",
-    "run_by_sample",
-]
-
-
-Array = NDArray[np.float64]
 
 #: Length of a chunk of a record, s.
 CHUNK = 60.0

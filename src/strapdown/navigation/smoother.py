@@ -33,12 +33,7 @@ from strapdown.navigation.measurements.gnss import TINY
 from strapdown.navigation.navigator import Navigator, Reference
 from strapdown.navigation.record import CovarianceSnapshots, GrowingRows, NavigationChunk
 from strapdown.tables import on_disk
-from strapdown.tables.checks import is_number
-
-__all__ = ["SMOOTHERS", "RauchTungStriebel", "Smoothed", "Smoothing", "SmoothingTape"]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, is_number
 
 #: Tolerance of the time of a mark, s: before an observation it is a microsecond earlier.
 SAME_MARK = 1.5e-6

@@ -16,24 +16,7 @@ from strapdown.dsp.outliers import KEPT, REPLACED, Screened
 from strapdown.dsp.samples import check_segment, even_step
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.tables import ACCEL, GYRO, MOTION, check_imu, check_motion_increments
-from strapdown.tables.checks import index_of, source_of, values_of
-
-__all__ = [
-    "CHANNELS",
-    "Changed",
-    "Grid",
-    "NoPrefilter",
-    "Portion",
-    "Prefilter",
-    "PrefilterReport",
-    "Prefiltered",
-    "grid_of",
-    "report_of",
-    "whole_factor",
-]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, source_of, values_of
 
 CHANNELS = [*GYRO, *ACCEL]
 # Samples processed at a time. This bounds memory, and every record is processed in chunks.

@@ -6,16 +6,12 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.dsp.decimation import FirDecimation, FirState, fir_decimation
 from strapdown.dsp.outliers import OutlierDesign, OutlierState
 from strapdown.errors import ConfigError
 from strapdown.prefilter.prefilter import Changed, Grid, Portion, Prefilter, whole_factor
-
-Array = NDArray[np.float64]
-
-__all__ = ["RobustFir", "RobustFirState"]
+from strapdown.tables.checks import Array
 
 
 @dataclass(frozen=True, eq=False)

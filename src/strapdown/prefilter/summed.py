@@ -7,14 +7,10 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.dsp.outliers import OutlierDesign, OutlierState
 from strapdown.prefilter.prefilter import Changed, Grid, Portion, Prefilter, whole_factor
-
-Array = NDArray[np.float64]
-
-__all__ = ["Summed", "SummedState"]
+from strapdown.tables.checks import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.constants import MAD_TO_SD
 from strapdown.dsp.outliers import REPLACED
@@ -17,10 +16,7 @@ from strapdown.estimation.covariance import Chernodarov, CovarianceForm, UpdateR
 from strapdown.estimation.robust import RobustUpdate
 from strapdown.estimation.signal_filter import SignalFilter, SignalState
 from strapdown.prefilter.prefilter import Changed, Grid, Portion, Prefilter, whole_factor
-
-Array = NDArray[np.float64]
-
-__all__ = ["RobustWd", "RobustWdState"]
+from strapdown.tables.checks import Array
 
 # Samples at the start from which the noise is estimated.
 SETTLE = 256

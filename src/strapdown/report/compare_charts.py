@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.frames import ned_from_geodetic
@@ -41,11 +40,11 @@ from strapdown.report.values import (
     speed_unit,
 )
 from strapdown.tables import places_of
+from strapdown.tables.checks import Array
 
 if TYPE_CHECKING:
     from strapdown.report.compare import RunComparison
 
-Array = NDArray[np.float64]
 
 #: Colors of the runs, the same in plan and charts.
 FIRST_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import TWO_SIDED_95
@@ -28,19 +27,7 @@ from strapdown.report.compare_folders import LONGEST, RunPart, SealedRun
 from strapdown.report.compare_numbers import is_over_ground
 from strapdown.report.crash_case import table_in
 from strapdown.tables import EULER, NED, QUATERNION, VELOCITY
-
-__all__ = [
-    "Curve",
-    "Difference",
-    "DifferenceScore",
-    "Track",
-    "curves_of",
-    "differences",
-    "plain_scores",
-    "tracks_of",
-]
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 #: Files of a trajectory with velocity and attitude, the best first.
 FORMS = ("csv", "parquet", "npz", "h5", "mat")

@@ -8,20 +8,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.bundle import Seal, input_files, write_bundle, write_json
 from strapdown.crash.watch import CrashLog, WatchOptions
 from strapdown.errors import DataError
 from strapdown.formats import csv
 from strapdown.formats.crash_writers import ACCEL_HEADINGS, GYRO_HEADINGS, TIME
+from strapdown.tables.checks import Array
 from strapdown.units import GYRO_UNITS
 
 COMMAND = "crash --live"
 RECEIVED, DETECTIONS = "received.csv", "detections.json"
 _RATES = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 _FORCES = ("accel_x_m_s2", "accel_y_m_s2", "accel_z_m_s2")
-Array = NDArray[np.float64]
 Rows = Sequence[Sequence[float]]
 
 

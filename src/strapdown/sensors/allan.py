@@ -11,9 +11,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import DataError
+from strapdown.tables.checks import Array
 from strapdown.tables.on_disk import let_go
-
-Array = NDArray[np.float64]
 
 #: Averaging times of a decade.
 PER_DECADE = 8

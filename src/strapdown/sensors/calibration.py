@@ -46,19 +46,7 @@ from strapdown.sensors.magnetometer import MagnetometerCalibration
 from strapdown.sensors.triad_errors import ImuErrors, Triad, TriadErrors, matrix_of, triad_of
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.tables import ACCEL, GYRO, MAG
-from strapdown.tables.checks import index_of, values_of
-
-__all__ = [
-    "CalibrationConditions",
-    "CalibrationRecord",
-    "ImuCalibration",
-    "KnownRotation",
-    "SensorCalibration",
-    "calibrate_imu",
-    "in_accel_axes",
-]
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, values_of
 
 #: A parameter whose standard deviation the log has not halved is not observed.
 NOT_OBSERVED = 0.5

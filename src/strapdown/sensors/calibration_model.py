@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown._kernels.attitude import quaternion_advance
@@ -35,8 +34,7 @@ from strapdown.sensors.calibration_stops import (
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.tables import find_gaps
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 XYZ = "xyz"
 PAIRS = ("xy", "xz", "yz")

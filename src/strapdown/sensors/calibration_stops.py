@@ -9,16 +9,13 @@ from itertools import pairwise
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import DataError
 from strapdown.sensors.rest import RestStretch, rest_between
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
-from strapdown.tables.checks import index_of, values_of
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, values_of
 
 DEG = math.pi / 180.0
 #: Ends of a turn without a rest: window, s.

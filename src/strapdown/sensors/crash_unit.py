@@ -25,9 +25,7 @@ from strapdown.sensors.triad_errors import (
 )
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, GYRO, check_table_sampling, find_gaps
-from strapdown.tables.checks import check_rows, check_time, index_of
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, check_rows, check_time, index_of
 
 
 @dataclass(frozen=True)

@@ -21,13 +21,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.triad_errors import Triad, TriadErrors
 from strapdown.tables import check_sampling_kind
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # With larger jitter, instants could overtake one another.
 MOST_JITTER = 0.1

@@ -16,6 +16,7 @@ from strapdown.sensors.rest import MAX_ACCEL_SD, MAX_GYRO_SD, QUIET_FACTOR, QUIE
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import (
+    Array,
     check_columns,
     check_time,
     index_of,
@@ -24,7 +25,6 @@ from strapdown.tables.checks import (
 )
 from strapdown.tables.on_disk import let_go, parts_of, room
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 # Long enough for a standard deviation and a mean, short enough to locate a fault.

@@ -31,9 +31,8 @@ from strapdown.sensors.health_log import (
 from strapdown.sensors.saturation import find_limits
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.checks import Array
 from strapdown.tables.on_disk import let_go, room, stored
-
-Array = NDArray[np.float64]
 
 # Saturated samples closer together than this are one fault.
 SAME_FAULT = 1.0  # s

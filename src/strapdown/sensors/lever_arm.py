@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.dsp.derivative import LocalSlope, local_slope
 from strapdown.errors import ConfigError
@@ -16,9 +16,7 @@ from strapdown.rotation import cross_matrix
 from strapdown.sensors.pre_crash import PreparedUnit
 from strapdown.sensors.triad_errors import triple
 from strapdown.tables import ACCEL, GYRO, check_imu, imu_table
-from strapdown.tables.checks import check_columns
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, check_columns
 
 
 @dataclass(frozen=True, eq=False)

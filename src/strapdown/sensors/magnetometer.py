@@ -7,14 +7,12 @@ from dataclasses import field as attribute
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.dsp.chi_square import chi_square_exceeded
 from strapdown.errors import DataError, Finding
 from strapdown.tables import ACCEL, MAG
-from strapdown.tables.checks import as_array
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, as_array
 
 #: Readings of a fit at most, and at least.
 MOST, LEAST = 4000, 50

@@ -25,8 +25,8 @@ from strapdown.sensors.magnetometer import (
     direction_sd,
     strength_residual,
 )
+from strapdown.tables.checks import Array
 
-Array = NDArray[np.float64]
 #: Information, its right side or step, and logarithm of the chance, for each scatter of the field.
 Part = tuple[Array, Array, Array]
 

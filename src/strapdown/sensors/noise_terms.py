@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import DataError
 from strapdown.sensors.allan import LEAST_SAMPLES, TERMS, block_covariance, shape
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # The likelihood. The record is cut into runs of blocks; the mean of a run is a block of the next
 # level. Within a run, differences from its mean are Gaussian with a covariance that the terms give

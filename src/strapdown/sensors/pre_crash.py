@@ -24,8 +24,7 @@ from strapdown.sensors.rest import (
 )
 from strapdown.sensors.triad_errors import Triad, triad_of
 from strapdown.tables import ACCEL, GYRO
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # Block lengths for comparing means within a stretch: long for long records, short for records that
 # start a tenth of a second before the impact.

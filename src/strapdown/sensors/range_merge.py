@@ -16,9 +16,8 @@ from strapdown.sensors.pre_crash import BiasEstimate
 from strapdown.sensors.rest import sd_of_mean
 from strapdown.sensors.saturation import RangeLimits
 from strapdown.sensors.triad_errors import ZERO, Triad, triad_of
-from strapdown.tables.checks import check_rows, check_time
+from strapdown.tables.checks import Array, check_rows, check_time
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 # After saturation the filter before the sampler still contains the clipped part: e⁻⁵ = 0.7 % after

@@ -18,6 +18,7 @@ from strapdown.sensors.health_log import WORDS, known_median
 from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty, TriadUncertainty
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import (
+    Array,
     check_columns,
     check_time,
     index_of,
@@ -26,7 +27,6 @@ from strapdown.tables.checks import (
     values_of,
 )
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 # Parity of redundant axes: their consistency, independent of the motion.

@@ -16,10 +16,9 @@ from strapdown.dsp.samples import occupied_grid
 from strapdown.errors import DataError
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import ACCEL, GYRO, MAG
-from strapdown.tables.checks import view_of
+from strapdown.tables.checks import Array, view_of
 from strapdown.tables.on_disk import let_go
 
-Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 Indices = NDArray[np.int64]
 

@@ -7,15 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.errors import Finding
 from strapdown.tables import ACCEL, GYRO
-from strapdown.tables.checks import index_of, source_of, values_of
-
-__all__ = ["check_sampling", "quantization_step"]
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, source_of, values_of
 
 #: Fewest steps that show a pattern.
 LEAST_STEPS = 50

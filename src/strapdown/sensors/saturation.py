@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
+
 Mask = NDArray[np.bool_]
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
@@ -28,8 +27,7 @@ from strapdown.sensors.unit_clocks import (
 )
 from strapdown.sensors.unmeasured import with_filled_axes, with_gyro
 from strapdown.tables import ACCEL, GYRO, SAMPLINGS
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 #: Stamps that records share to be compared; of one by itself, a peak between two steps.
 LEAST_STAMPS, LEAST_ALONE = 8, 4

@@ -7,16 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.tables import ACCEL, GYRO, check_table_sampling, find_gaps
-from strapdown.tables.checks import check_rows, check_time
-
-Array = NDArray[np.float64]
-
+from strapdown.tables.checks import Array, check_rows, check_time
 
 LEAST_SAMPLES = 6
 # Mean magnitude of the specific force at rest that indicates g as unit, and one without gravity.

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.errors import ConfigError, Finding
-from strapdown.tables.checks import is_number
+from strapdown.tables.checks import Array, is_number
 
 Triad = tuple[float, float, float]
 Matrix = tuple[Triad, Triad, Triad]
@@ -276,8 +276,6 @@ def check_sd(given: Any, quantity: str, unit: str, file: str | None = None) -> N
 # Checks of the matrix M from sensor axes to body axes. Its rows are the body's forward, right and
 # down, each in components along the sensor's x, y, z: ``v_body = M v_sensor``.
 
-
-Array = NDArray[np.float64]
 
 #: Unit designs by name. Chernodarov (2009): with its (1,4) set to -Θz, the printed matrix of (1) is
 #: that of ``2 dq/dt = q (0, ω)`` for ``ω = (-Θy, Θx, Θz)``: gyros rotated by 90° about z.

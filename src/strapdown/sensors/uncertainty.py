@@ -8,16 +8,13 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import KEYS, Key, Sensor
 from strapdown.sensors.error_chain import Seed, child
 from strapdown.sensors.triad_errors import Triad, TriadErrors, TriadLike, matrix_of, triad_of
-from strapdown.tables.checks import is_number
+from strapdown.tables.checks import Array, is_number
 from strapdown.units import GYRO_UNITS
-
-Array = NDArray[np.float64]
 
 # A component with a smaller share of an axis is not affected by that axis's range limit.
 FEELS = 1e-3

@@ -26,8 +26,7 @@ from strapdown.sensors.error_chain import time_constant
 from strapdown.sensors.saturation import RangeLimits, find_limits
 from strapdown.sensors.triad_channels import OVER_RANGE, AxisGroup, TriadChannels
 from strapdown.sensors.triad_errors import check_sd
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # Trigger and correlation disagree if they differ by more standard deviations than this.
 CONTRADICTION = 4.0

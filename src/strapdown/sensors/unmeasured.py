@@ -8,15 +8,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, GYRO
-
-Array = NDArray[np.float64]
-
+from strapdown.tables.checks import Array
 
 AXES = ("forward", "right", "down")
 TURNS = ("roll", "pitch", "heading")

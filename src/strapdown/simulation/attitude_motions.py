@@ -21,8 +21,7 @@ from strapdown.simulation.motion import (
     check_numbers,
     minimum_jerk,
 )
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,7 @@ from strapdown.sensors.error_chain import child
 from strapdown.sensors.triad_errors import Triad
 from strapdown.simulation.motion import Motion, check_numbers
 from strapdown.tables import GEODETIC
-
-__all__ = ["Camera", "film", "paper_cameras", "path_from_cameras"]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # Stream keys below the seed of a camera.
 POSE, LENS, READING = range(3)

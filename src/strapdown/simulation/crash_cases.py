@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
@@ -26,8 +25,6 @@ from strapdown.simulation.crash_recording import (
     record_crash,
 )
 from strapdown.simulation.mounted_motion import point_path
-
-__all__ = ["CASES", "CaseRecorder", "CrashCase", "find_case"]
 
 
 @dataclass(frozen=True)
@@ -196,8 +193,6 @@ def find_case(name: str) -> CrashCase:
 
 # Data that recorders and cameras of a simulated crash deliver, with the truth.
 
-
-Array = NDArray[np.float64]
 
 # After the impact: 0.75 s of path, plus the margin for filters and late triggers.
 RECORDED = 0.85  # s

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84, Ellipsoid
@@ -29,8 +28,8 @@ from strapdown.simulation.motion import (
     euler_body_acceleration,
     euler_body_rate,
 )
+from strapdown.tables.checks import Array
 
-Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 _ZERO: Triple = (0.0, 0.0, 0.0)

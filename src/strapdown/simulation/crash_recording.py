@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown.errors import ConfigError
@@ -23,9 +23,8 @@ from strapdown.sensors.uncertainty import TriadUncertainty, draw_errors, uncerta
 from strapdown.simulation.imu import mean_over, sample_accelerometer, sample_gyro
 from strapdown.simulation.motion import Motion, check_numbers
 from strapdown.tables import ACCEL, GYRO, check_sampling_kind
+from strapdown.tables.checks import Array
 from strapdown.units import GYRO_UNITS
-
-Array = NDArray[np.float64]
 
 # The low-pass treats the motion as linear between samples where it is so within this tolerance: a
 # hundredth of the finest quantization step of a recorder.

@@ -10,15 +10,14 @@ from functools import cached_property, partial
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.simulation.motion import RateIntegral, check_numbers, integrate_rate
 from strapdown.tables import trajectory_table
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # Closer to a pole, heading and longitude turn faster than a vehicle does.
 MOST_NORTHERN = 89.0  # deg

@@ -17,8 +17,7 @@ from strapdown.sensors.error_chain import Seed, child, gauss_markov, normal
 from strapdown.sensors.triad_errors import ZERO, Triad, TriadLike
 from strapdown.simulation.earth_motion import EarthMotion
 from strapdown.tables import GEODETIC, VELOCITY, gnss_table
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 #: Response of a receiver beyond its limits: no fixes, false fixes, or no effect.
 ON_EXCESS = ("lost", "garbage", "unaffected")

@@ -23,8 +23,7 @@ from strapdown.sensors.error_chain import (
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.motion import Motion
 from strapdown.tables import attitude_table, check_sampling_kind, imu_table
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # Samples that fit in a few gigabytes of memory with all derived arrays.
 MOST_SAMPLES = 5_000_000

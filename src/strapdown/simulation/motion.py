@@ -12,13 +12,13 @@ from typing import Protocol
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError
+from strapdown.tables.checks import Array
 
-Array = NDArray[np.float64]
 Quaternion = tuple[float, float, float, float]
 
 

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import earth, frames, rotation
 from strapdown.errors import ConfigError
@@ -18,8 +18,7 @@ from strapdown.simulation.earth_motion import EarthMotion
 from strapdown.simulation.imu import mean_between
 from strapdown.simulation.motion import check_numbers
 from strapdown.tables import EULER, NED, VELOCITY, trajectory_table
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 
 @dataclass(frozen=True)

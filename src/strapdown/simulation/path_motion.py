@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84, Ellipsoid
@@ -28,8 +27,7 @@ from strapdown.simulation.motion import (
     euler_attitude,
     euler_body_rate,
 )
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # At larger pitch, heading and roll axes nearly coincide and the angles lose their meaning.
 MOST_PITCH = 80.0  # deg

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
@@ -24,8 +24,7 @@ from strapdown.simulation.earth_motion import (
 from strapdown.simulation.motion import check_numbers, euler_attitude, euler_body_rate
 from strapdown.simulation.path_motion import MOST_PITCH
 from strapdown.tables import EULER, check_trajectory, places_of
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array
 
 # Checks of the spline between two knots.
 _LOOKS = 16

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.two_vector import triad
@@ -28,12 +27,7 @@ from strapdown.navigation.measurements.measurement import TabulatedMeasurement, 
 from strapdown.navigation.measurements.vehicle import Odometer
 from strapdown.systems.navigation_source import read_measured
 from strapdown.tables import ACCEL, GEODETIC, MAG, VELOCITY, VELOCITY_SD
-from strapdown.tables.checks import index_of, values_of
-
-__all__ = ["Magnetic", "propose_aids", "propose_magnetometer"]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, values_of
 
 #: Least number of rows within the samples.
 LEAST = 10

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
 from strapdown.alignment.fine import FineAlignment, FineResult
@@ -38,20 +37,10 @@ from strapdown.systems.alignment_source import AlignmentSource, read_alignment_s
 from strapdown.systems.inputs import Memory, SavedRun, configuration_file
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, EULER, GYRO
-from strapdown.tables.checks import index_of, source_of, values_of
+from strapdown.tables.checks import Array, index_of, source_of, values_of
 
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
-
-__all__ = [
-    "AlignmentReadiness",
-    "AlignmentRun",
-    "alignment_readiness",
-    "channel_findings",
-    "reference_offset",
-    "run_alignment",
-    "with_record_as_reason",
-]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -455,8 +444,6 @@ def _outliers(imu: pd.DataFrame) -> tuple[str, np.ndarray] | None:
 
 # Accuracy over alignment time: coarse over shorter parts, fine epoch by epoch.
 
-
-Array = NDArray[np.float64]
 
 #: Shortest length to try, s, and number of lengths, evenly spaced in their logarithm.
 ALIGNMENT_READINESS_LEAST, TRIES = 15.0, 16

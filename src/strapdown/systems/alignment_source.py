@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.bundle import InputFiles, input_files, log_files, sensor_file
 from strapdown.config.logs import AxesTable, LogTable
@@ -29,14 +28,10 @@ from strapdown.sensors.triad_errors import (
 )
 from strapdown.systems.inputs import part_of_log, read_options, refuse_long_span
 from strapdown.tables import ACCEL, EULER, GYRO
-from strapdown.tables.checks import values_of
+from strapdown.tables.checks import Array, values_of
 
 if TYPE_CHECKING:
     from strapdown.config.alignment import AlignmentSpec
-
-__all__ = ["AlignmentSource", "axes_matrices", "body_record", "read_alignment_source"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

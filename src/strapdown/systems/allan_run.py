@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.bundle import InputFiles, Seal, log_files
 from strapdown.config.logs import AllanSpec, AxesTable, LogTable
@@ -34,15 +33,12 @@ from strapdown.systems.alignment_source import body_record
 from strapdown.systems.inputs import Memory, SavedRun, refuse_long_span
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GYRO, find_gaps
-from strapdown.tables.checks import index_of
+from strapdown.tables.checks import Array, index_of
 from strapdown.tables.on_disk import let_go
 
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = ["AllanRun", "run_allan"]
-
-Array = NDArray[np.float64]
 
 #: Shortest stationary stretch that is used, and one below which the result says that it is short.
 LEAST_REST, SHORT = 60.0, 1800.0  # s

@@ -20,16 +20,14 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.aid_table import but_temperature, stream_beside, temperature_of
 from strapdown.progress import Progress, silent
 from strapdown.sensors.calibration import (
-    CalibrationConditions,
-    CalibrationRecord,
     ImuCalibration,
-    KnownRotation,
     SensorCalibration,
     calibrate_imu,
     correlations,
     sealed_text,
 )
-from strapdown.sensors.calibration_model import GRAVITY, GRAVITY_SD, PRIOR
+from strapdown.sensors.calibration_model import GRAVITY, GRAVITY_SD, PRIOR, CalibrationConditions
+from strapdown.sensors.calibration_stops import CalibrationRecord, KnownRotation
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.magnetometer import (
     LEAST,
@@ -43,15 +41,12 @@ from strapdown.systems.alignment_source import body_record
 from strapdown.systems.inputs import Memory, SavedRun, refuse_long_span
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import MAG
-from strapdown.tables.checks import GYRO, index_of, values_of
+from strapdown.tables.checks import GYRO, Array, index_of, values_of
 from strapdown.tables.sample_clock import sample_clock
 
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = ["CalibrateRun", "run_calibrate"]
-
-Array = NDArray[np.float64]
 
 DEG = math.pi / 180.0
 #: Poses that differ by more count as two, rad; a face is up within this, rad.

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.bundle import InputFiles, Seal, input_files, log_files
 from strapdown.config.extrinsics import ExtrinsicsSpec
@@ -34,6 +33,7 @@ from strapdown.systems.inputs import Memory, SavedRun, refuse_long_span
 from strapdown.systems.navigation_run import CHUNK, NavigationRun, run_navigation
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GYRO, MAG
+from strapdown.tables.checks import Array
 
 if TYPE_CHECKING:
     from strapdown.navigation.navigator import Reference
@@ -42,9 +42,6 @@ if TYPE_CHECKING:
     from strapdown.navigation.replay import PipelineRun
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = ["ExtrinsicsRun", "run_extrinsics"]
-
-Array = NDArray[np.float64]
 
 #: Standard normal quantile of a 95 % bound.
 NORMAL = 1.959964

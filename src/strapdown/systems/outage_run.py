@@ -68,23 +68,11 @@ from strapdown.systems.navigation_source import NavigationSource, read_navigatio
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GYRO, TRAJECTORY
 from strapdown.tables.aiding import odometer_table
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.checks import Array, index_of, values_of
 from strapdown.tables.sample_clock import ends_of_part
 
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
-
-__all__ = [
-    "Drift",
-    "OutageRun",
-    "drift_of_sensor",
-    "forecast_of_sensor",
-    "outage_navigator",
-    "outage_of_run",
-    "run_outage",
-    "sensor_of",
-    "stated_motion",
-]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -261,8 +249,6 @@ def _alone(found: Forecast, *, now: bool) -> Forecast:
 
 # Drift of a navigation run during outages of its receivers, predicted and measured.
 
-
-Array = NDArray[np.float64]
 
 #: Length of a chunk until navigation begins, s.
 CHUNK = 2.0

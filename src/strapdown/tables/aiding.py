@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.tables.checks import (
+    Array,
     as_array,
     check_rows,
     check_same_length,
@@ -23,8 +24,6 @@ from strapdown.tables.checks import (
     source_of,
     values_of,
 )
-
-Array = NDArray[np.float64]
 
 BAROMETER = ["height", "height_sd"]
 

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.dsp.samples import moving_mean
-from strapdown.tables.checks import Gap, find_gaps
+from strapdown.tables.checks import Array, Gap, find_gaps
 
-Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 
 #: Fewest samples of a record whose clock is looked for.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown.errors import DataError
@@ -18,6 +18,7 @@ from strapdown.tables.checks import (
     QUATERNION,
     REFERENCE,
     VELOCITY,
+    Array,
     as_array,
     check_columns,
     check_latitude,
@@ -27,8 +28,6 @@ from strapdown.tables.checks import (
     joined,
     source_of,
 )
-
-Array = NDArray[np.float64]
 
 TRAJECTORY = [*GEODETIC, *VELOCITY, *EULER]
 

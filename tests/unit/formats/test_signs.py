@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import time
 
 import pytest
 
 from strapdown.formats import READERS, reader_of, readers_of
-from strapdown.formats.signs import HEAD, Signs
+from strapdown.formats.signs import HEAD, Signs, json_beginning
 
 
 def test_signs_of_a_file_and_of_a_folder(tmp_path):
@@ -88,3 +89,18 @@ def test_no_text_is_slow_to_recognize(tmp_path, unit):
     started = time.process_time()
     list(readers_of(path))
     assert time.process_time() - started < 2.0
+
+
+def test_of_json_that_was_cut_there_is_all_before_the_cut():
+    value = {"name": 'a, {b] \\ "c"', "t": [0.0, -1e-3, None], "imu": [{"x": 1}, {"x": [2, []]}]}
+    text = json.dumps(value)
+    assert json_beginning(text + '\n{"x": 1}') == (value, len(text))
+    for end in range(1, len(text)):
+        part, length = json_beginning(text[:end])
+        assert length == 0
+        assert list(part) == list(value)[: len(part)]
+        assert part.get("t", []) == value["t"][: len(part.get("t", []))]
+    assert json_beginning(text[:-3] + "nonsense")[0]["imu"][0] == {"x": 1}
+    for other in ("", "x", '"word"', "[INFO] a, b", "{a: 1}"):
+        assert not json_beginning(other)[0]
+    assert json_beginning("[" * 100_000) == (None, 0)

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown import rotation
+from strapdown import formats, rotation
 from strapdown.api.attitude import compare_attitude
 from strapdown.attitude_algorithms import Quaternion, attitude_history
 from strapdown.attitude_comparison.error_budget import _median
@@ -246,12 +246,15 @@ def test_the_bias_of_a_rest_is_removed_where_it_is_significant(tmp_path, bias_de
     assert off.gyro_bias["rad_per_s"] is None
 
 
-def test_a_log_whose_z_points_up_is_turned_by_gravity(tmp_path):
+def test_a_log_whose_z_points_up_is_turned_by_gravity(tmp_path, monkeypatch):
     rng = np.random.default_rng(9)
     time = np.arange(3000) / RATE
     accel = still(time.size, rng, up=9.81)
     log = write(tmp_path, time, rates(time) * (time > 8.0)[:, None], accel)
+    made, assemble = [], formats.assemble
+    monkeypatch.setattr(formats, "assemble", lambda *a, **k: made.append(a) or assemble(*a, **k))
     bench = compare_attitude(log, **ONE)
+    assert len(made) == 1  # the columns are converted once
     (note,) = [f for f in bench.findings if f.code == "attitude.axes-by-gravity"]
     assert note.data["axes"] == "x,-y,-z"
     assert abs(bench.initial["roll_deg"]) < 1.0

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
 from strapdown.errors import Finding
+from strapdown.tables.checks import Array
 from strapdown.tables.on_disk import filled, let_go, stored
 from strapdown.units import TIME_UNITS, factor_of
 
@@ -133,8 +134,6 @@ def conclude(
 
 # Inference of the unit of time stamps, their rate, and their faults.
 
-
-Array = NDArray[np.float64]
 
 # Prior of logging rates: log10 of a density over log10 of the rate in Hz. Phones, boards and
 # navigation units keep 10 to 1000 Hz, crash recorders 10 to 20 kHz; a rotation is not logged every

@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.estimation.covariance import Observation
 from strapdown.estimation.sensor_blocks import gauss_markov, random_walk, unseen
@@ -23,12 +22,7 @@ from strapdown.navigation.measurements.measurement import (
 )
 from strapdown.rotation import cross_matrix
 from strapdown.tables.aiding import BAROMETER, barometer_from_pressure, check_barometer
-from strapdown.tables.checks import index_of, source_of, values_of
-
-__all__ = ["Barometer"]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, source_of, values_of
 
 HOUR = 3600.0
 

@@ -19,19 +19,7 @@ from strapdown.frames import place_difference, ways_between
 from strapdown.navigation.measurements.gnss_clock import TimeOffset, time_offset
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GEODETIC, GYRO, VELOCITY, VELOCITY_SD
-from strapdown.tables.checks import index_of, source_of, values_of
-
-__all__ = [
-    "ClockStep",
-    "Offsets",
-    "receiver_clock",
-    "stamp_step",
-    "step_finding",
-    "unsure_steps",
-    "window_offsets",
-]
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, source_of, values_of
 
 #: Length of a window, s, and the largest number of them.
 WINDOW, MOST = 60.0, 10

@@ -30,13 +30,8 @@ from strapdown.navigation.measurements.measurement import (
 )
 from strapdown.tables import GEODETIC, GNSS, POSITION_SD, VELOCITY_SD, check_gnss
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
-from strapdown.tables.checks import index_of, is_number, source_of, values_of
+from strapdown.tables.checks import Array, index_of, is_number, source_of, values_of
 from strapdown.tables.gnss import QUALITIES
-
-__all__ = ["Gnss", "Moving", "arm_of", "moving"]
-
-
-Array = NDArray[np.float64]
 
 #: Kind of an epoch: the first of its values.
 POSITION_CODE, VELOCITY_CODE, HORIZONTAL_CODE = 0.0, 1.0, 2.0

@@ -16,21 +16,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.frames import place_difference
 from strapdown.navigation.measurements.gnss_course import LEAST_STEPS, courses, integrals
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD, usable
-from strapdown.tables.checks import RELATIVE, index_of, source_of, values_of
-
-__all__ = [
-    "TimeOffset",
-    "VelocityDelay",
-    "check_overlap",
-    "find_time_offset",
-    "find_velocity_delay",
-    "sure_delay",
-    "time_offset",
-    "velocity_delay",
-]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import RELATIVE, Array, index_of, source_of, values_of
 
 WEEK = 604_800.0
 #: Unix time of the first second of GPS time, and its lead over UTC since 2017, s.

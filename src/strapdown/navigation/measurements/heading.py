@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.estimation.covariance import Observation
 from strapdown.estimation.sensor_blocks import unseen
@@ -22,12 +21,7 @@ from strapdown.navigation.measurements.measurement import (
 )
 from strapdown.rotation import cross_matrix
 from strapdown.tables.aiding import HEADING, check_heading
-from strapdown.tables.checks import index_of, values_of
-
-__all__ = ["Heading"]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, values_of
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Observation
@@ -24,12 +23,7 @@ from strapdown.navigation.measurements.measurement import (
 )
 from strapdown.rotation import cross_matrix
 from strapdown.tables import MAG
-from strapdown.tables.checks import checked_values, index_of, values_of
-
-__all__ = ["Magnetometer"]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, checked_values, index_of, values_of
 
 #: Field of the Earth at its surface, at least and at most, uT.
 WEAKEST, STRONGEST = 20.0, 70.0

@@ -12,7 +12,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown._kernels.compensation import errors_of_states, true_inputs
@@ -24,24 +23,7 @@ from strapdown.estimation.error_model import PHYSICAL, ErrorModel
 from strapdown.estimation.sensor_states import SensorStates
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
-from strapdown.tables.checks import MAG, is_number
-
-__all__ = [
-    "Epochs",
-    "ImuDerivedMeasurement",
-    "Measurement",
-    "TabulatedMeasurement",
-    "View",
-    "check_block",
-    "check_number",
-    "check_numbers",
-    "check_other_name",
-    "lasting",
-    "longer_by",
-]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import MAG, Array, is_number
 
 
 @dataclass(frozen=True, eq=False)

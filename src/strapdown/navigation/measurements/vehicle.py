@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown._kernels.level import AXIS
@@ -33,20 +33,7 @@ from strapdown.navigation.measurements.measurement import (
 )
 from strapdown.rotation import cross_matrix
 from strapdown.tables.aiding import BODY_VELOCITY, ODOMETER, check_body_velocity, check_odometer
-from strapdown.tables.checks import index_of, values_of
-
-__all__ = [
-    "BodyVelocity",
-    "NoSlip",
-    "Odometer",
-    "VehicleAxes",
-    "point_velocity",
-    "rate_columns",
-    "turn_of_body",
-]
-
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import Array, index_of, values_of
 
 # Index of the rotation about the vertical among the physical errors.
 HEADING = 8
