@@ -36,6 +36,7 @@ from strapdown.formats.find_columns import (
     reference,
     steady_triads,
     unit_stated,
+    with_reversed,
     without_gyro,
 )
 from strapdown.formats.inference.conclusion import infer_accel, infer_time_unit
@@ -82,7 +83,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     ConfigError: an option names a column that does not exist.
     """
     questions = Questions(raw.name)
-    raw = _with_force_of_parts(raw, options)
+    raw, options = with_reversed(_with_force_of_parts(raw, options), options)
     found = find_columns(raw, options, questions)
     if missing := [q for q in GYRO if q not in found]:
         raise without_gyro(raw, missing)

@@ -90,7 +90,8 @@ class ReadOptions:
     ----------
     columns : dict of str to str
         Quantity (``time``, ``gyro_x`` …, or ``gyro``, ``accel`` for a group of three) to the
-        name of the column in the file, or its number, from 1.
+        name of the column in the file, or its number, from 1; with a minus before it if it
+        counts the other way.
     gyro_unit, accel_unit, time_unit : str, optional
         Keys of `units.GYRO_UNITS`, `ACCEL_UNITS`, `TIME_UNITS`; or of `GYRO_SUMS`,
         `ACCEL_SUMS` for increments per sample.

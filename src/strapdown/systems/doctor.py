@@ -937,6 +937,8 @@ _LIMITS = (
     "io.axes-upside-down",
     "io.force-scale",
     "io.gyro-axes-differ",
+    "io.gyro-axis-in-other-unit",
+    "io.gyro-axis-noise-of-other-unit",
     "io.gyro-scale",
     "io.gyro-turns-against-gravity",
     "navigation.course-shows-gyro-unit",
