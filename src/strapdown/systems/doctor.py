@@ -944,6 +944,8 @@ _LIMITS = (
     "navigation.course-shows-gyro-unit",
     "navigation.course-turns",
     "navigation.course-turns-opposite",
+    "navigation.forward-axis-elsewhere",
+    "navigation.forward-not-along-course",
 )
 
 

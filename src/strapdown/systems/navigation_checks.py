@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown import rotation
+from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.error_model import ERROR_MODELS
@@ -18,6 +19,7 @@ from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.gnss_clock import WHOLE
 from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
+from strapdown.navigation.measurements.vehicle import NoSlip
 from strapdown.sensors.health_log import LEAST_SAMPLES, ChannelFault
 from strapdown.sensors.imu_health import check_imu_channels
 from strapdown.sensors.uncertainty import ImuUncertainty
@@ -59,18 +61,35 @@ def look_through(
     from strapdown.config.navigation import make_aids
 
     found: list[Finding] = []
+    yaw = _mounting_yaw(spec)
     for aid in make_aids(spec):
         table = tables.get(aid.name)
         if table is None:
             continue
         if isinstance(aid, Gnss):
             part = WHOLE if spec.log is None else spec.log.part_s(index_of(imu)[0])
-            found += gnss_readiness(table, imu, aid, part)
+            found += gnss_readiness(table, imu, aid, part, mounting_yaw=yaw)
             _refuse_far(spec, table, imu, aid)
             found += () if spec.log is None else _lever_arm(table, aid)
         elif isinstance(aid, TabulatedMeasurement):
             _refuse_apart(table, imu)
     return (*found, *_height(spec, imu))
+
+
+def _mounting_yaw(spec: NavigationSpec) -> float | None:
+    """Heading of the forward axis less that of the vehicle, rad, where the run assumes one.
+
+    An alignment by the course does, and wheels that do not slip.
+    """
+    from strapdown.config.navigation import make_aids
+
+    coarse = spec.coarse
+    if spec.start is None and coarse.kind == "gnss_course":
+        course = coarse.make()
+        assert isinstance(course, GnssCourse)
+        return math.radians(course.mounting_yaw_deg) + (math.pi if course.reverse else 0.0)
+    wheels = next((aid for aid in make_aids(spec) if isinstance(aid, NoSlip)), None)
+    return None if wheels is None else math.radians(wheels.yaw_deg)
 
 
 def finer_than_arm(table: pd.DataFrame) -> float | None:

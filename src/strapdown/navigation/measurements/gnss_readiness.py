@@ -24,7 +24,7 @@ from strapdown.navigation.measurements.gnss_clock import (
     sure_delay,
     time_offset,
 )
-from strapdown.navigation.measurements.gnss_course import check_turns
+from strapdown.navigation.measurements.gnss_course import check_forward, check_turns
 from strapdown.tables import (
     GEODETIC,
     POSITION_SD,
@@ -53,6 +53,7 @@ def gnss_readiness(
     aid: Gnss | None = None,
     part: tuple[float, float] = WHOLE,
     search: Callable[[float], TimeOffset | None] | None = None,
+    mounting_yaw: float | None = 0.0,
 ) -> tuple[Finding, ...]:
     """Check fixes by themselves, and against the inertial record.
 
@@ -69,6 +70,9 @@ def gnss_readiness(
     search : callable, optional
         Gives the offset of the receiver's clock at a delay of its velocities, s; `time_offset`, if
         not given.
+    mounting_yaw : float, optional, rad
+        Heading of the forward axis less that of the vehicle, as configured; None where nothing
+        takes it to point where the body moves.
 
     Returns
     -------
@@ -93,6 +97,8 @@ def gnss_readiness(
         found.append(step_finding(table, imu, step))
     delay = aid.velocity_delay or sure_delay(table)
     found += check_turns(table, imu, delay)
+    if mounting_yaw is not None:
+        found += check_forward(table, imu, delay, mounting_yaw)
     offset = time_offset(table, imu, delay) if search is None else search(delay)
     found += find_time_offset(table, offset, aid.time_offset, aid.time_offset_sd)
     return tuple(found)
