@@ -16,7 +16,7 @@ from strapdown.formats.columns import parse_axes, read_name
 from strapdown.formats.find_columns import AXES, Column, reference, stated_word
 from strapdown.formats.inference.conclusion import THRESHOLD, Inference
 from strapdown.formats.inference.infer import Signals, infer_signals
-from strapdown.formats.recording import Questions, RawLog, ReadOptions, as_stated
+from strapdown.formats.recording import Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import APPLE
 from strapdown.tables import SAMPLINGS
 from strapdown.tables.checks import all_finite
@@ -680,30 +680,28 @@ def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]
     # Left-handed axes that the user states turn the sense of rotation.
     if reversed_sense and stated is not None and mirrored(*parse_axes(stated)):
         return
-    stated = as_stated(_other_columns(log, str(axes.value)))
     log.warn(
         "io.gyro-turns-against-gravity" if reversed_sense else "io.gyro-axes-differ",
         "gyro",
         axes=axes.value,
-        flags=stated["flags"],
-        keys=stated["keys"],
+        columns=_other_columns(log, str(axes.value)),
         reason=axes.finding(),
     )
 
 
-def _other_columns(log: LogInUse, axes: str) -> dict[str, str]:
-    """Return the columns by which the gyro has the axes of the accelerometer: ``x,y,-z``.
+def _other_columns(log: LogInUse, axes: str) -> str:
+    """Return the statement by which the gyro has the axes of the accelerometer: ``x,y,-z``.
 
-    By quantity, with a minus before a column that counts the other way.
+    Of columns by quantity, with a minus before one that counts the other way.
     """
-    columns = {}
+    columns = []
     for axis, along in zip(AXES, axes.split(","), strict=True):
         if axis != along:
             name = log.found[f"gyro_{along[-1]}"].source
             plain = reference(log.raw, name).removeprefix("-")
             reversed_ = name.startswith("-") != along.startswith("-")
-            columns[f"gyro_{axis}"] = f"-{plain}" if reversed_ else plain
-    return columns
+            columns.append(f"gyro_{axis}={'-' if reversed_ else ''}{plain}")
+    return ",".join(columns)
 
 
 def _instead(unit: str, inferred: Inference, scale: Inference | None = None) -> str | None:

@@ -65,7 +65,7 @@ def codes(imu):
 def test_the_columns_that_a_reversed_axis_is_told_to_need_can_be_stated():
     reversed_ = table(RATES * [1, 1, -1])
     (said,) = (f for f in sd.read_imu(reversed_).findings if f.code == "io.gyro-axes-differ")
-    assert said.data["flags"] == "--columns gyro_z=-gyro_z_rad_s"
+    assert said.data["columns"] == "gyro_z=-gyro_z_rad_s"
     right = sd.read_imu(reversed_, columns={"gyro_z": "-gyro_z_rad_s"})
     assert "io.gyro-axes-differ" not in codes(right)
     np.testing.assert_allclose(right[GYRO], RATES, atol=1e-12)
@@ -75,13 +75,13 @@ def test_the_columns_that_a_reversed_axis_is_told_to_need_can_be_stated():
         for f in sd.read_imu(table(RATES), columns={"gyro_x": "-gyro_x_rad_s"}).findings
         if f.code == "io.gyro-axes-differ"
     )
-    assert said.data["flags"] == "--columns gyro_x=gyro_x_rad_s"
+    assert said.data["columns"] == "gyro_x=gyro_x_rad_s"
 
 
 def test_exchanged_and_reversed_axes_at_once():
     rates = RATES[:, [1, 0, 2]] * [-1, 1, 1]  # x of the table is -y, y is x
     (said,) = (f for f in sd.read_imu(table(rates)).findings if f.code == "io.gyro-axes-differ")
-    columns = dict(part.split("=") for part in said.data["flags"].split()[1].split(","))
+    columns = dict(part.split("=") for part in said.data["columns"].split(","))
     right = sd.read_imu(table(rates), columns=columns)
     np.testing.assert_allclose(right[GYRO], RATES, atol=1e-12)
 
