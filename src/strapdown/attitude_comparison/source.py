@@ -117,11 +117,15 @@ def read_source(spec: AttitudeSpec) -> AttitudeSource:
                     percent=by_gravity.data["percent"],
                 ),
             )
+        imu = log.imu
+        if any(f.code == "io.no-gravity" for f in findings):
+            # Nothing levels by acceleration without gravity: the log is one of a gyro.
+            imu = imu.drop(columns=ACCEL)
         return AttitudeSource(
             log.name,
             "recorded log",
             log.origin,
-            log.imu,
+            imu,
             log.truth,
             log.scored,
             log.readings,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.dsp.samples import noise_free
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.arrays import as_rows, epoch_of, numbers, open_dates, ticks_of
 from strapdown.formats.clocks import (
@@ -224,6 +225,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     sampling = sampling_of(log, units)
     _report_gaps(log, time, body["gyro"])
     _report_beyond_limits(log, body, kept)
+    _report_constant(log, body, axes.axis)
     let_go(block)
     _report_weightless(log, body.get("accel"))
     columns = [f"{triad}_{a}" for triad in units for a in AXES]
@@ -856,6 +858,30 @@ def _report_beyond_limits(
 WEIGHTLESS = 0.3 * STANDARD_GRAVITY  # m/s²
 #: Rows, spread evenly over a log, of which this is judged.
 SOME = 100_000
+
+
+def _report_constant(log: LogInUse, body: Mapping[str, Array], axis: Sequence[int]) -> None:
+    """Warn of a channel that never changes beside others that have the noise of a sensor.
+
+    `axis`: of the sensor, for each of the body.
+    """
+    for triad in ("gyro", "accel"):
+        if triad not in body:
+            continue
+        channels = body[triad].T
+        constant = [bool((c[:SOME] == c[0]).all() and (c == c[0]).all()) for c in channels]
+        if not any(constant) or all(constant):
+            continue
+        if noise_free(np.column_stack([c[:SOME] for c in channels])):
+            continue
+        for k in np.flatnonzero(constant):
+            log.warn(
+                "io.channel-constant",
+                f"{triad}_{AXES[k]}",
+                name=log.found[f"{triad}_{AXES[axis[k]]}"].source,
+                value=float(channels[k][0]) + 0.0,
+                count=len(channels[k]),
+            )
 
 
 def _report_weightless(log: LogInUse, accel: Array | None) -> None:

@@ -12,6 +12,7 @@ import pandas as pd
 from strapdown import rotation
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.dsp.samples import noise_free
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.error_model import ERROR_MODELS
 from strapdown.frames import ecef_from_geodetic, place_difference
@@ -205,7 +206,7 @@ def _height(spec: NavigationSpec, imu: pd.DataFrame) -> tuple[Finding, ...]:
 
 #: Faults that make a channel unusable, and their largest share of a record. A linear filter does
 #: not know the rotation that saturated samples lost.
-MOST = {"missing": 0.5, "stuck": 0.5, "saturated": 0.15}
+MOST = {"missing": 0.5, "stuck": 0.5, "dead": 0.5, "saturated": 0.15}
 #: Share of the largest reading of a saturated stretch that counts as saturated, too.
 AT_END = 0.999
 #: Approximate noise ratio to the data sheet of gyros in deg/s that are read as rad/s.
@@ -275,10 +276,22 @@ def _moves(tables: Mapping[str, pd.DataFrame], begin: float, end: float) -> bool
     return False
 
 
+def most_unusable(values: np.ndarray) -> dict[str, float]:
+    """Return the largest share of a record by kind of fault, of channels, (n, k).
+
+    In a simulation without noise a constant channel may be right.
+    """
+    if noise_free(values):
+        return {kind: most for kind, most in MOST.items() if kind not in ("dead", "stuck")}
+    return dict(MOST)
+
+
 def _usable(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, ...]:
     """The longest stretch of each channel and kind of fault; DataError: a channel is lost."""
-    for (channel, kind), count in unusable_samples(imu, faults).items():
-        if count > MOST.get(kind, 1.0) * len(imu):
+    lost = unusable_samples(imu, faults)
+    most = most_unusable(values_of(imu, [*GYRO, *ACCEL])) if lost else {}
+    for (channel, kind), count in lost.items():
+        if count > most.get(kind, 1.0) * len(imu):
             of_kind = [f for f in faults if (f.channel, f.kind) == (channel, kind)]
             longest = max(of_kind, key=lambda f: f.last - f.first).finding
             raise DataError(longest.explains("navigation.channel-lost"))

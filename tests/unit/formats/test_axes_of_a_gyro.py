@@ -1,4 +1,4 @@
-"""Single axes of a gyro that are reversed, exchanged or in another unit: named, and put right.
+"""Single axes that are reversed, exchanged, in another unit or dead: named, and put right.
 
 A hand turns a body about three axes under gravity, with the noise of a phone.
 """
@@ -20,8 +20,11 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv, read_log
 from strapdown.formats.recording import ReadOptions
+from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
+from strapdown.sensors.uncertainty import stated_imu
 from strapdown.simulation import simulate_imu
+from strapdown.systems.navigation_checks import channel_findings
 from strapdown.tables import ACCEL, GYRO
 
 DEG = np.degrees(1.0)
@@ -178,3 +181,51 @@ def test_the_noise_of_one_axis_shows_another_unit_where_gravity_does_not_turn(fa
     log = pd.DataFrame(np.column_stack([imu.index, imu[[*GYRO, *ACCEL]]]), columns=SI)
     log["gyro_x_rad_s"] *= factor
     assert ("io.gyro-axis-noise-of-other-unit" in codes(sd.read_imu(log))) == warned
+
+
+# A channel that never changes.
+
+
+@pytest.mark.parametrize("name", SI[1:])
+def test_a_channel_that_never_changes_is_said_by_the_reading(name):
+    log = table(RATES)
+    log[name] = log[name].iloc[0]
+    said = [f for f in sd.read_imu(log).findings if f.code == "io.channel-constant"]
+    assert [f.data["name"] for f in said] == [name]
+    assert said[0].severity == "warning"
+    assert "io.channel-constant" in {f.code for f in sd.compare_attitude(log).findings}
+
+
+def test_a_constant_channel_of_a_motion_without_noise_is_right():
+    """A car in a plane turns about its vertical alone."""
+    imu, _ = simulate_imu(motion(), ImuErrors(), rate=50.0, sampling="instantaneous", seed=1)
+    log = pd.DataFrame(np.column_stack([imu.index, imu[[*GYRO, *ACCEL]]]), columns=SI)
+    log["gyro_x_rad_s"] = 0.0
+    assert "io.channel-constant" not in codes(sd.read_imu(log))
+
+
+@pytest.mark.parametrize("value", [0.0, 0.0123])
+def test_a_run_refuses_a_channel_that_never_changes(value):
+    noise = TriadErrors(noise_density=np.radians(0.005))
+    errors = ImuErrors(noise, replace(noise, noise_density=1e-3))
+    imu, _ = simulate_imu(motion(), errors, rate=50.0, sampling="instantaneous", seed=1)
+    imu["gyro_z"] = value
+    sensors = stated_imu(load_sensor("bmi160"), {}, {})
+    with pytest.raises(DataError, check=coded("navigation.channel-lost", quantity="gyro_z")):
+        channel_findings(imu, sensors, None, {})
+
+
+def test_acceleration_without_gravity_levels_nothing(tmp_path, run_cli):
+    """The doctor proposes an attitude, and the attitude goes on as with a gyro alone."""
+    log = table(RATES)
+    turned = np.linalg.norm(RATES, axis=1) > 0.01
+    push = 0.8 * np.sin(np.outer(T, [3.1, 2.2, 4.3])) * turned[:, None]
+    log[SI[4:]] = push + np.random.default_rng(5).normal(0.0, 0.02, push.shape)
+    path = tmp_path / "log.csv"
+    csv.write(path, {n: v.to_numpy() for n, v in log.items()}, {})
+    done = run_cli("doctor", str(path), "--out", str(tmp_path / "d"))
+    assert done.code == 0 and "strapdown attitude" in done.out
+    run = sd.compare_attitude(path)
+    assert "io.no-gravity" in {f.code for f in run.findings}
+    # Nothing that was started by acceleration stands beside it.
+    assert run.initial["method"] == "zero"
