@@ -4,15 +4,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = [
-    "CORTEX_M4F_CYCLES",
-    "DEG_PER_HOUR",
-    "MAD_TO_SD",
-    "MICRO_G",
-    "STANDARD_GRAVITY",
-    "TWO_SIDED_95",
-]
-
 #: Conventional standard acceleration of gravity, m/s² (3rd CGPM, 1901, Resolution 2).
 STANDARD_GRAVITY = 9.80665
 

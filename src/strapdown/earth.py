@@ -19,17 +19,6 @@ from strapdown._kernels import earth as kernel
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError
 
-__all__ = [
-    "MagneticField",
-    "centrifugal",
-    "earth_rate",
-    "gravitation",
-    "gravity",
-    "magnetic_field",
-    "radii_of_curvature",
-    "transport_rate",
-]
-
 Array = NDArray[np.float64]
 
 # Deeper, normals to the ellipsoid intersect; beyond the upper limit a number is not a height.

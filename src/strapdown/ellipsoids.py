@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError
 
-__all__ = ["ELLIPSOIDS", "WGS84", "Ellipsoid", "find_ellipsoid"]
-
 
 @dataclass(frozen=True)
 class Ellipsoid:

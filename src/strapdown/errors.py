@@ -35,21 +35,6 @@ from importlib import resources
 from os import PathLike, fspath
 from typing import Any, Literal, Self
 
-__all__ = [
-    "ConfigError",
-    "DataError",
-    "DivergenceError",
-    "Finding",
-    "Severity",
-    "StrapdownError",
-    "Words",
-    "add_note",
-    "add_warning",
-    "check_choice",
-    "nearest",
-    "printable",
-]
-
 #: A note informs, a warning speaks against a result, an error ended the work.
 Severity = Literal["note", "warning", "error"]
 #: Whose words a sentence speaks: arguments, options, the keys of a configuration, or what the pages

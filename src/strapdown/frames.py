@@ -21,21 +21,6 @@ from strapdown.earth import earth_rate, refuse, rows
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError
 
-__all__ = [
-    "C_ne",
-    "antenna_motion",
-    "ecef_from_geodetic",
-    "ecef_from_ned",
-    "geodetic_from_ecef",
-    "geodetic_from_ned",
-    "geodetic_from_utm",
-    "ned_from_ecef",
-    "ned_from_geodetic",
-    "place_difference",
-    "q_ne",
-    "ways_between",
-]
-
 Array = NDArray[np.float64]
 
 #: Valid distances of a point in ECEF from the center of the Earth, m. Nearer, more than one normal

@@ -8,8 +8,6 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
-__all__ = ["Choices", "load_on_first_use"]
-
 
 def load_on_first_use(package: str, homes: Mapping[str, str]) -> None:
     """Let a package export names of its modules without importing these.

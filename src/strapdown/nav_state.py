@@ -15,8 +15,6 @@ from strapdown.errors import DataError
 from strapdown.tables import EULER, check_trajectory, places_of, trajectory_table
 from strapdown.tables.checks import is_number
 
-__all__ = ["NavState"]
-
 Array = NDArray[np.float64]
 
 

@@ -21,8 +21,6 @@ from typing import Any
 
 from strapdown.errors import ConfigError, Finding
 
-__all__ = ["GROUPS", "WithPlugins", "plugin", "plugins"]
-
 #: By kind, the group of its entry points.
 GROUPS = {
     "reader": "strapdown.readers",

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-__all__ = ["Progress", "silent"]
-
-
 #: Called with a stage and the share of the whole that is done.
 Progress = Callable[[str, float], None]
 

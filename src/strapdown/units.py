@@ -14,40 +14,6 @@ from dataclasses import dataclass
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError
 
-__all__ = [
-    "ACCEL_SUMS",
-    "ACCEL_UNITS",
-    "ANGLES",
-    "COUNTS",
-    "DATE_ORDERS",
-    "ENDINGS",
-    "FACTORS",
-    "FORCES",
-    "GYRO_SUMS",
-    "GYRO_UNITS",
-    "INFERRED",
-    "LENGTHS",
-    "MAG_UNITS",
-    "MASSES",
-    "MOMENTS",
-    "OF_CRASHES",
-    "OF_LOGS",
-    "OF_TABLES",
-    "PRESSURES",
-    "RELATIVE_FIELDS",
-    "SHOWN_UNITS",
-    "SPEEDS",
-    "TIME_UNITS",
-    "ShownUnits",
-    "factor_of",
-    "find_unit",
-    "named_unit",
-    "parse_unit",
-    "si_of",
-    "unit_of",
-    "unit_words",
-]
-
 _DEGREE = math.pi / 180.0
 
 #: Factors to rad/s.

@@ -94,8 +94,6 @@ if TYPE_CHECKING:
     from strapdown.evaluation.second_log import SecondLog
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = ["AttitudeComparison", "run_comparison"]
-
 Array = NDArray[np.float64]
 
 #: Standard deviations from which the mean rate at rest is a bias.

@@ -20,8 +20,6 @@ from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import GYRO
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["ErrorBudget", "Holding", "find_budget", "holding_time"]
-
 Array = NDArray[np.float64]
 
 #: Rotations are compared over windows of at most and at least this length, s: so many in a record;

@@ -17,8 +17,6 @@ from strapdown.config.spec import Spec, specify
 from strapdown.errors import ConfigError
 from strapdown.systems.inputs import check_part
 
-__all__ = ["AttitudeOptions", "AttitudeSpec", "refuse_no_rate"]
-
 #: Algorithms that are compared by default: one of each.
 COMPARED = tuple(ALGORITHMS)
 #: Meaning of ``all``: the variants, too.

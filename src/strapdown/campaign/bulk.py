@@ -53,8 +53,6 @@ from strapdown.tables import VELOCITY as VELOCITIES
 from strapdown.tables.checks import index_of, values_of
 from strapdown.units import SPEEDS
 
-__all__ = ["BulkCases", "bulk_attitude", "bulk_cases", "bulk_crash", "bulk_outage"]
-
 Array = NDArray[np.float64]
 
 

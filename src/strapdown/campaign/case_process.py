@@ -23,8 +23,6 @@ from typing import IO, Any
 
 from strapdown.errors import ConfigError, StrapdownError
 
-__all__ = ["CaseProcess", "Row", "run_case"]
-
 #: Outcome of a case: status, code, findings, scalars in order, curves in order.
 Row = dict[str, Any]
 _LENGTH = struct.Struct("<Q")

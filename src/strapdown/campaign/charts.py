@@ -41,8 +41,6 @@ from strapdown.report.document import capital
 from strapdown.report.values import GAP
 from strapdown.units import named_unit
 
-__all__ = ["curves", "distributions", "logs", "over_grid", "sensitivity"]
-
 #: Categories of a chart, lines of a panel, and panels of a chart, at most.
 CATEGORIES, LINES, PANELS = 40, 6, 6
 #: Values of which a histogram is drawn, at least.

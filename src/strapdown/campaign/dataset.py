@@ -26,8 +26,6 @@ from strapdown.bundle import to_json
 from strapdown.bundle.atomic_folder import flush_entry
 from strapdown.errors import ConfigError, DataError
 
-__all__ = ["BLOCK", "Dataset", "frozen_of"]
-
 #: Cases that are in memory at a time, and of a block, which is a file.
 WINDOW = 2**14
 BLOCK = 6 * WINDOW

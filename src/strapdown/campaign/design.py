@@ -26,8 +26,6 @@ from strapdown.errors import ConfigError, check_choice
 if TYPE_CHECKING:
     from strapdown.campaign.bulk import BulkCases
 
-__all__ = ["Campaign", "Case"]
-
 Array = NDArray[np.float64]
 
 #: Streams of random numbers of a campaign, by use.

@@ -22,8 +22,6 @@ from urllib.parse import urlsplit
 from strapdown.campaign.case_process import CaseProcess
 from strapdown.errors import ConfigError
 
-__all__ = ["Workers", "cores", "run_batches"]
-
 #: Time that a batch is to take, s: long beside what it costs to send, short beside a campaign.
 BATCH = 2.0
 #: Batches in flight for each worker; the second waits while the first runs.

@@ -21,8 +21,6 @@ from strapdown.config.toml_file import KeyPath, read_toml
 from strapdown.constants import TWO_SIDED_95
 from strapdown.errors import ConfigError
 
-__all__ = ["KINDS", "Kind", "at_path", "with_value"]
-
 Table = dict[str, Any]
 
 

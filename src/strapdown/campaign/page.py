@@ -40,8 +40,6 @@ from strapdown.report.document import listed as listed_texts
 from strapdown.report.values import GAP, share_words
 from strapdown.units import named_unit
 
-__all__ = ["campaign_document"]
-
 #: Rows of a table, at most.
 ROWS = 100
 #: Share of the logs of a fleet below which a finding is said on page one.

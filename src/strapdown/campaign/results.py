@@ -12,8 +12,6 @@ from strapdown.campaign.summary import DECADES
 from strapdown.report.values import GAP, MINUS, decimals, plain, share_words
 from strapdown.units import named_unit
 
-__all__ = ["Results"]
-
 Cell = Mapping[str, Any]
 
 _ACRONYMS = ("nees", "nis", "rms", "gnss", "imu")

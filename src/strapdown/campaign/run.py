@@ -34,8 +34,6 @@ from strapdown.errors import ConfigError, DataError, StrapdownError
 from strapdown.progress import Progress, silent
 from strapdown.report.report_bundle import ReportBundle
 
-__all__ = ["CampaignRun", "case_of", "merge_parts", "open_campaign", "resume", "run_campaign"]
-
 #: Rows, and time, s, after which parts are written.
 ROWS, SECONDS = 5000, 5.0
 #: Of the folder in which a campaign works until it is complete.

@@ -13,8 +13,6 @@ from strapdown.config.reading import FileSpec
 from strapdown.config.spec import Fault, FileName, Number, Positive, Spec, Word, refuse
 from strapdown.config.toml_file import KeyPath
 
-__all__ = ["CampaignSpec", "ParameterTable", "key_path"]
-
 #: Most cases of a campaign, and of the values of one parameter.
 MOST_CASES, MOST_VALUES = 1_000_000_000, 10_000
 #: Keys of each distribution of a drawn parameter.

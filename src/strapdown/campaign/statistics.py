@@ -30,23 +30,6 @@ from strapdown.dsp.chi_square import (
     student_quantile,
 )
 
-__all__ = [
-    "Consistency",
-    "Extremes",
-    "Moments",
-    "Share",
-    "SobolIndices",
-    "Values",
-    "blocks",
-    "consistency",
-    "count_between",
-    "order_statistics",
-    "quantile_ranks",
-    "quantiles",
-    "share_of",
-    "student_interval",
-]
-
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Keys = NDArray[np.uint64]

@@ -31,8 +31,6 @@ from strapdown.campaign.statistics import (
 from strapdown.dsp.chi_square import chi_square_quantile
 from strapdown.report.report_bundle import finite
 
-__all__ = ["LEVELS", "STATUSES", "summarise"]
-
 #: A function that returns an iterator over batches of cases, in order of case.
 Batches = Callable[[], Iterator[Any]]
 

@@ -20,19 +20,6 @@ from strapdown.live.journal import Journal, received_folder
 from strapdown.live.replay import RunClock
 from strapdown.live.sources import LineSource, open_source
 
-__all__ = [
-    "begin_journal",
-    "let_go_of_received",
-    "open_lines",
-    "output_of",
-    "recovered",
-    "refuse_beside_recover",
-    "remove_empty",
-    "remove_received",
-    "sealing",
-    "warner",
-]
-
 
 def begin_journal(folder: Path, command: str, run: Mapping[str, Any]) -> Journal:
     """Start the journal of a run beside its output.

@@ -25,8 +25,6 @@ from strapdown.simulation import SCENARIOS
 from strapdown.simulation.crash_cases import CASES
 from strapdown.simulation.crash_motion import CRASHES
 
-__all__ = ["HEADINGS", "Listed", "cell_text", "listed_modules"]
-
 #: Defaults of slots that a file omits, where the default is not a module.
 _UNSAID = {"update_rule": "; where none is named, every observation counts in full"}
 

@@ -11,14 +11,6 @@ from strapdown.config.reading import FileSpec
 from strapdown.config.spec import Later, Positive, Spec, Triple
 from strapdown.config.toml_file import read_toml
 
-__all__ = [
-    "CrashSimulationSpec",
-    "LogSpec",
-    "ScenarioFile",
-    "ScenarioSpec",
-    "SimulateSpec",
-]
-
 
 class GyroErrorsSpec(Spec):
     """Errors of the gyros of a scenario, for each axis."""

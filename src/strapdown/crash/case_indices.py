@@ -24,8 +24,6 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.units import FACTORS, find_unit
 
-__all__ = ["CrashIndex", "occupant_indices", "vehicle_indices"]
-
 Array = NDArray[np.float64]
 
 

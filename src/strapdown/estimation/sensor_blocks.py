@@ -23,34 +23,6 @@ from strapdown.sensors.triad_errors import Triad, TriadLike, triad_of
 from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty, TriadUncertainty
 from strapdown.tables.checks import is_number
 
-__all__ = [
-    "ERRORS_OF_SENSORS",
-    "STATED_STATES",
-    "StateProcess",
-    "accel_bias",
-    "accel_drift",
-    "accel_misalignment",
-    "accel_scale",
-    "g_sensitivity",
-    "gauss_markov",
-    "gyro_bias",
-    "gyro_drift",
-    "gyro_misalignment",
-    "gyro_scale",
-    "lever_arm",
-    "mounting",
-    "random_walk",
-    "resting_sd",
-    "resting_states",
-    "standard_states",
-    "stated_states",
-    "states_that_are_stated",
-    "time_offset",
-    "unseen",
-    "with_processes",
-]
-
-
 Array = NDArray[np.float64]
 
 XYZ = ("x", "y", "z")

@@ -21,8 +21,6 @@ from strapdown.frames import ned_from_geodetic
 from strapdown.tables import places_of
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = ["ControlPointScore", "rigid_fit", "score_control_points"]
-
 Array = NDArray[np.float64]
 
 #: Least distance from point to point, m: closer points define no direction.

@@ -20,9 +20,6 @@ from strapdown.tables.checks import index_of, values_of
 if TYPE_CHECKING:
     from strapdown.attitude_algorithms.algorithm import AttitudeRun
 
-__all__ = ["attitude_at", "error_angles", "largest_differences", "rotation_contradicted"]
-
-
 Array = NDArray[np.float64]
 
 

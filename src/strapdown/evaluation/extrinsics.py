@@ -22,8 +22,6 @@ from strapdown.sensors.lever_arm import lever_matrix, rate_effect
 from strapdown.tables import ACCEL, GYRO, check_imu
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["Estimate", "Extrinsics", "between_imus"]
-
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
@@ -298,6 +296,7 @@ def bounded(
 
 
 def named(group: str, unit: str) -> list[tuple[str, str]]:
+    """Names and units of the components of a vector."""
     return [(f"{group}_{axis}", unit) for axis in "xyz"]
 
 
@@ -307,6 +306,7 @@ def crossed(vectors: Array) -> Array:
 
 
 def rms(values: Array) -> float:
+    """Root mean square of the lengths of vectors, (n, 3)."""
     return float(np.sqrt((values**2).sum(axis=1).mean()))
 
 
@@ -555,6 +555,7 @@ SHAPE_WORDS = ("scale_1", "scale_2", "scale_3", "shear_1", "shear_2", "shear_3")
 
 
 def compared(time: Array, own: Array, before: Array, after: Array) -> pd.DataFrame:
+    """Table of vectors, (n, 3), of sensor a and of the other before and after the fit."""
     columns = [f"{word}_{axis}" for word in ("a", "before", "after") for axis in "xyz"]
     index = pd.Index(time, name="time")
     return pd.DataFrame(np.hstack([own, before, after]), index=index, columns=columns)

@@ -32,8 +32,6 @@ from strapdown.sensors.magnetometer import SHAPES, calibrate_magnetometer
 from strapdown.tables import GYRO, MAG, check_imu, imu_table
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["imu_to_magnetometer"]
-
 Array = NDArray[np.float64]
 
 #: Windows within which the field is constant: so many in a log, and their length, s.

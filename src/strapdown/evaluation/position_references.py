@@ -31,16 +31,6 @@ from strapdown.evaluation.reference_points import INSTANT, NUMBER, instant
 from strapdown.sensors.rest import RestStretch
 from strapdown.tables import ACCEL, QUATERNION
 
-__all__ = [
-    "DeadReckoningErrors",
-    "Leg",
-    "PlaceReference",
-    "dead_reckon",
-    "is_place",
-    "parse_place",
-    "score_places",
-]
-
 
 @dataclass(frozen=True)
 class PositionScore:

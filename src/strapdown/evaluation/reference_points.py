@@ -33,19 +33,6 @@ from strapdown.rotation import level
 from strapdown.sensors.rest import RestStretch
 from strapdown.tables import EULER, THETA, references_table
 
-__all__ = [
-    "ACCEL_BIAS_SD",
-    "in_words",
-    "parse_reference",
-    "reference_errors",
-    "references_from_words",
-    "same_pose_candidates",
-    "score_references",
-    "tilt_references",
-    "tilt_sd_deg",
-    "with_tilt",
-]
-
 
 @dataclass(frozen=True)
 class Score:

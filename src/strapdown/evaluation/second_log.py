@@ -20,20 +20,6 @@ from strapdown.tables import GYRO, attitude_table, check_imu, find_gaps, imu_tab
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-__all__ = [
-    "CoarseOffset",
-    "EvenRates",
-    "align_second_log",
-    "coarse_offset",
-    "even_rates",
-    "even_values",
-    "first_clock",
-    "proper_rotation",
-    "second_clock",
-    "truth_from_second_log",
-]
-
-
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 

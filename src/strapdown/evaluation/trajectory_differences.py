@@ -28,20 +28,6 @@ from strapdown.tables import (
 from strapdown.tables.checks import view_of
 from strapdown.tables.on_disk import let_go
 
-__all__ = [
-    "ROTATION_ERROR",
-    "SAME_BEAT",
-    "DifferenceSummary",
-    "InterpolationCost",
-    "QuantityError",
-    "interpolation_cost",
-    "same_stamps",
-    "summarise_differences",
-    "trajectory_at",
-    "trajectory_differences",
-]
-
-
 Array = NDArray[np.float64]
 
 ROTATION_ERROR = ["phi_N", "phi_E", "phi_D"]

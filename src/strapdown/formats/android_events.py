@@ -44,6 +44,7 @@ from strapdown.formats.join import join
 from strapdown.formats.known_formats import force_of, sensor_log
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
+from strapdown.formats.text_columns import are_data, decoded, fields_of, is_comment, separator_of
 from strapdown.formats.triad_units import LIKELY
 from strapdown.units import TIME_UNITS
 
@@ -113,12 +114,12 @@ detect = Signs(
 
 def _layout(text: str) -> tuple[int, int, int, str | None, dict[str, str]] | None:
     """Return the fields of kind, stamp and first value, the unit of stamps in a header, letters."""
-    lines = [line for line in text.splitlines()[:TOP] if line.strip() and not csv.is_comment(line)]
+    lines = [line for line in text.splitlines()[:TOP] if line.strip() and not is_comment(line)]
     if len(lines) < 3:
         return None
-    separator = csv.separator_of(lines[1])
-    rows = [csv.fields_of(line, separator) for line in lines]
-    header = rows[0] if len(rows[0]) >= 5 and not csv.are_data(rows[0][2:]) else []
+    separator = separator_of(lines[1])
+    rows = [fields_of(line, separator) for line in lines]
+    header = rows[0] if len(rows[0]) >= 5 and not are_data(rows[0][2:]) else []
     # An axis of a sensor is in the header of a table of samples.
     axes = ("gyro_", "accel_", "mag_", "rate_")
     if any(str(read_name(name).quantity).startswith(axes) for name in header):
@@ -129,7 +130,7 @@ def _layout(text: str) -> tuple[int, int, int, str | None, dict[str, str]] | Non
     orders = ((0, 1, 2), (1, 0, 2), (2, 0, 3))
     body = [r for r in rows[1:-1] if len(r) >= 5]
     # Values with labels, x=0.01, are those of printed lines.
-    plain = csv.are_data([field for row in body for field in row[2:5]])
+    plain = are_data([field for row in body for field in row[2:5]])
     if len(body) < 0.9 * (len(rows) - 2) or not plain:
         return None
     for kind, stamp, first in orders[: 3 if body and len(body[0]) > 5 else 2]:
@@ -195,7 +196,7 @@ def _advance(stamps: list[float]) -> bool:
 
 def read(path: Path) -> RawLog:
     """Read the gyro, with the other sensors interpolated to its stamps."""
-    text, findings = csv.decoded(path.read_bytes(), path.name)
+    text, findings = decoded(path.read_bytes(), path.name)
     layout = _layout(text[: 1 << 16])
     if layout is None:
         raise DataError("io.no-gyroscope-holds", file=path.name, quantity="gyro", held="other rows")
@@ -206,10 +207,10 @@ def read(path: Path) -> RawLog:
     unknown: set[str] = set()
     lines = text.splitlines()
     for row, line in enumerate(lines, 1):
-        if not line.strip() or csv.is_comment(line):
+        if not line.strip() or is_comment(line):
             continue
-        separator = separator or csv.separator_of(line)
-        fields = csv.fields_of(line, separator)
+        separator = separator or separator_of(line)
+        fields = fields_of(line, separator)
         which = None
         if len(fields) > kind:
             which = letters.get(fields[kind]) or kind_of(fields[kind])

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding, add_note, add_warning
-from strapdown.formats import csv
 from strapdown.formats.crash_record import LONGEST_NAME, CrashChannel, CrashRecord, clean, unique
 from strapdown.formats.crash_samples import Clock, seconds_of
 from strapdown.formats.crash_table import MOST_REMARKS, NOTE, ChannelName, channel_name
+from strapdown.formats.text_columns import NUMBER, decoded, fields_of, separator_of
 from strapdown.units import FACTORS, OF_CRASHES, SPEEDS, TIME_UNITS, find_unit, unit_words
 
 Array = NDArray[np.float64]
@@ -152,7 +152,7 @@ def detect(path: Path) -> bool:
         data = path.read_bytes()
         if b"\0" in data[:4096] and not data.startswith((b"\xff\xfe", b"\xfe\xff")):
             return False
-        text, _ = csv.decoded(data, path.name)
+        text, _ = decoded(data, path.name)
     except (DataError, OSError):
         return False
     # Logs of other kinds are not parsed.
@@ -243,17 +243,17 @@ def _filled(table: _Open) -> bool:
 def _fields(line: str, table: _Open | None) -> list[str]:
     """Split a line, in a table by the separator that yields as many fields as the header has."""
     for separator in ("\t", ";", ",") if table is not None else ():
-        fields = csv.fields_of(line, separator)
+        fields = fields_of(line, separator)
         if table is not None and len(fields) == len(table.names):
             return fields
     # Blanks separate words of a title.
-    separated = csv.separator_of(line)
-    return [line.strip()] if separated is None else csv.fields_of(line, separated)
+    separated = separator_of(line)
+    return [line.strip()] if separated is None else fields_of(line, separated)
 
 
 def _is_header(fields: list[str]) -> bool:
     full = [f for f in fields if f]
-    if len(full) < 2 or any(csv.NUMBER.fullmatch(f) for f in full):
+    if len(full) < 2 or any(NUMBER.fullmatch(f) for f in full):
         return False
     times = [f for f in full if _is_time(f)]
     others = [f for f in full if f not in times]
@@ -271,12 +271,12 @@ def _is_time(heading: str) -> bool:
 
 def _is_row(table: _Open, fields: list[str]) -> bool:
     at = next(k for k, n in enumerate(table.names) if _is_time(n))
-    return len(fields) > max(at, 1) and bool(csv.NUMBER.fullmatch(fields[at]))
+    return len(fields) > max(at, 1) and bool(NUMBER.fullmatch(fields[at]))
 
 
 def _are_units(fields: list[str]) -> bool:
     known = [find_unit(f.strip("[](){} "), OF_CRASHES) is not None for f in fields if f]
-    return bool(known) and known[0] and not any(csv.NUMBER.fullmatch(f) for f in fields)
+    return bool(known) and known[0] and not any(NUMBER.fullmatch(f) for f in fields)
 
 
 def _labelled(fields: list[str], event: int) -> int:
@@ -294,7 +294,7 @@ def _labelled(fields: list[str], event: int) -> int:
 
 def _number(cell: str) -> float:
     text = cell.strip().rstrip("%").strip()
-    if csv.NUMBER.fullmatch(text):
+    if NUMBER.fullmatch(text):
         return float(text.replace(",", "."))
     return 1.0 if text.lower() in _ON else 0.0 if text.lower() in _OFF else math.nan
 
@@ -504,7 +504,7 @@ def read(path: Path) -> CrashRecord:
     A channel for each column, under its heading; of the tables of one event the same `event`.
     Columns of one quantity in two units are one channel where they agree within their rounding.
     """
-    text, findings = csv.decoded(path.read_bytes(), path.name)
+    text, findings = decoded(path.read_bytes(), path.name)
     found = _tables(text)
     for row, count, width in found.short:
         raise DataError("io.edr-header-longer", file=path.name, row=row, count=count, width=width)

@@ -31,6 +31,7 @@ from strapdown.formats.crash_record import (
 )
 from strapdown.formats.crash_samples import ONE_STEP, Clock, seconds_of
 from strapdown.formats.recording import RawLog
+from strapdown.formats.text_columns import decoded, is_comment
 from strapdown.formats.vocabularies import CRASHES
 from strapdown.units import FACTORS, OF_CRASHES, find_unit
 
@@ -340,7 +341,7 @@ def read_text_table(path: Path) -> tuple[RawLog, dict[str, dict[str, Any]], str,
         raise DataError(
             "io.bytes-more-than-table-crash", file=path.name, st_size=path.stat().st_size
         )
-    text, findings = csv.decoded(path.read_bytes(), path.name)
+    text, findings = decoded(path.read_bytes(), path.name)
     if "\0" in text:
         raise DataError("io.crash-table-with-zero-bytes", file=path.name)
     raw = csv.parse(text.encode(), path.name, (path,), OF_CRASHES)
@@ -367,7 +368,7 @@ def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
     names = list(raw.columns)
     notes: dict[str, dict[str, Any]] = {}
     for row, line in enumerate(lines, start=1):
-        if line.strip() and not csv.is_comment(line):
+        if line.strip() and not is_comment(line):
             break
         if not line.startswith(NOTE):
             continue

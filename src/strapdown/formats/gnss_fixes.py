@@ -199,36 +199,20 @@ def _over_ellipsoid(fixes: Fixes, options: GnssOptions) -> Array:
                 "io.heights-over-ellipsoid-already", file=fixes.name, quantity="datum_height_m"
             )
         return fixes.place
+    heights = {"file": fixes.name, "quantity": "alt", "source": fixes.height_source}
     if options.datum_height is None and fixes.heights_from in ("open", "as stated"):
         if fixes.heights_from == "open":
-            add_note(
-                fixes.findings,
-                "io.height-level-open",
-                file=fixes.name,
-                quantity="alt",
-                source=fixes.height_source,
-            )
+            add_note(fixes.findings, "io.height-level-open", **heights)
         return fixes.place
     if options.datum_height is None:
         # Heights that stay over the sea change gravity by 35 µg at most; over a take-off on a
         # mountain they would change it by more, so that no value is proposed.
         proposed = {"flags": "--gnss-datum-height 0", "keys": "datum_height_m = 0.0"}
-        raise DataError(
-            _LEVELS[fixes.heights_from],
-            file=fixes.name,
-            quantity="alt",
-            source=fixes.height_source,
-            **(proposed if fixes.heights_from != "take-off" else {}),
-        )
+        heights |= proposed if fixes.heights_from != "take-off" else {}
+        raise DataError(_LEVELS[fixes.heights_from], **heights)
     if fixes.heights_from != NOWHERE:
-        add_note(
-            fixes.findings,
-            "io.heights-with-datum" if options.datum_height else "io.heights-stay-over-datum",
-            file=fixes.name,
-            quantity="alt",
-            source=fixes.height_source,
-            datum_height=options.datum_height,
-        )
+        code = "io.heights-with-datum" if options.datum_height else "io.heights-stay-over-datum"
+        add_note(fixes.findings, code, **heights, datum_height=options.datum_height)
     return np.asarray(fixes.place + np.array([0.0, 0.0, options.datum_height]))
 
 

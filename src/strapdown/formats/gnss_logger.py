@@ -34,7 +34,7 @@ from strapdown.formats.join import join
 from strapdown.formats.known_formats import column, optional, sensor_log, stated_by, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
-from strapdown.formats.text_columns import parsed
+from strapdown.formats.text_columns import decoded, parsed
 
 Array = NDArray[np.float64]
 
@@ -199,7 +199,7 @@ def read_fixes(path: Path) -> Fixes:
 
 def _lines(path: Path) -> dict[str, list[tuple[int, str]]]:
     """Group lines by their kind, each with its row; drop a truncated last line."""
-    text, _ = csv.decoded(path.read_bytes(), path.name)
+    text, _ = decoded(path.read_bytes(), path.name)
     found: dict[str, list[tuple[int, str]]] = {}
     wanted = {k for kinds, _ in KINDS.values() for k in kinds} | {FIX}
     for row, line in enumerate(text.splitlines(), 1):

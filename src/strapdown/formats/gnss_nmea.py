@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from strapdown.errors import DataError, Finding, add_note
-from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.signs import HEAD, Signs, first_bytes
+from strapdown.formats.text_columns import are_data, decoded, fields_of
 from strapdown.formats.writing import (
     FileOptions,
     Tables,
@@ -64,10 +64,10 @@ class _Epoch:
 
 def rows_beside(path: Path) -> int:
     """Count the lines, of the first, that are not sentences and hold the numbers of a sensor."""
-    text, _ = csv.decoded(first_bytes(path, HEAD), path.name)
+    text, _ = decoded(first_bytes(path, HEAD), path.name)
     others = [line for line in text.splitlines() if line.strip() and "$" not in line]
-    rows = [csv.fields_of(line, csv.separator_of(line)) for line in others]
-    return sum(len(row) >= LEAST_FIELDS and csv.are_data(row) for row in rows)
+    rows = [fields_of(line) for line in others]
+    return sum(len(row) >= LEAST_FIELDS and are_data(row) for row in rows)
 
 
 def read(path: Path) -> Fixes:
@@ -76,7 +76,7 @@ def read(path: Path) -> Fixes:
     In seconds since 1970 if a date is stated, otherwise in seconds of the first day. Sentences with
     a wrong checksum are dropped and counted.
     """
-    text, findings = csv.decoded(path.read_bytes(), path.name)
+    text, findings = decoded(path.read_bytes(), path.name)
     epochs: list[_Epoch] = []
     wrong: list[int] = []
     for row, line in enumerate(text.splitlines(), 1):

@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.errors import DataError, Finding, add_note, add_warning
-from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK, Clock, leap_seconds
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.signs import Signs
-from strapdown.formats.text_columns import columns_at_once
+from strapdown.formats.text_columns import columns_at_once, decoded
 from strapdown.frames import geodetic_from_ecef, q_ne
 
 Array = NDArray[np.float64]
@@ -112,7 +111,7 @@ def _decoded(path: Path) -> tuple[str, list[Finding]]:
         raise DataError("io.file-empty-2", file=path.name)
     if data.startswith(codecs.BOM_UTF8):
         data = data[3:]
-    return csv.decoded(data, path.name)
+    return decoded(data, path.name)
 
 
 def _layout(lines: list[str], file: str, findings: list[Finding]) -> _Layout:

@@ -19,6 +19,7 @@ from strapdown.formats.hdf5 import SIGNATURE, outline, read_arrays
 from strapdown.formats.known_formats import column, lacking, selected, stated_by, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, first_bytes, head
+from strapdown.formats.text_columns import fields_of
 from strapdown.units import TIME_UNITS, unit_of
 
 # APDM Opal: CSV and HDF5 of Motion Studio, one or several monitors.
@@ -66,9 +67,9 @@ def _csv(path: Path) -> RawLog:
     top = next((k for k, line in enumerate(lines) if line.startswith("Time,")), None)
     if top is None or len(lines) < top + 3:
         raise DataError("io.csv-without-rows", file=path.name, row=len(lines))
-    names, units = (csv.fields_of(lines[top + k], ",") for k in (0, 1))
+    names, units = (fields_of(lines[top + k], ",") for k in (0, 1))
     # Rows may end in a comma, which the names do not.
-    more = csv.fields_of(lines[top + 2], ",")[len(names) :]
+    more = fields_of(lines[top + 2], ",")[len(names) :]
     header = ",".join([*names, *(f"unnamed {k}" for k in range(len(more)))])
     raw = under(path, top, header=header, drop=1)
     said = dict(zip(names, units, strict=False))
@@ -321,7 +322,7 @@ def _has_names_of_xsens(path: Path) -> bool:
     if not csv.detect(path):
         return False
     for line in head(path, HEAD).splitlines():
-        fields = set(csv.fields_of(line, csv.separator_of(line)))
+        fields = set(fields_of(line))
         if {COUNTER, STAMP} & fields:
             return any({f"{t}_{a}" for a in "XYZ"} <= fields for t in XSENS_TRIADS)
     return False

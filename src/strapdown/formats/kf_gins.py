@@ -21,6 +21,7 @@ from strapdown.formats.clocks import GPS, WEEK, Clock, clock_of, unrolled, with_
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import HEAD, Signs, first_bytes
+from strapdown.formats.text_columns import is_data
 from strapdown.formats.triad_units import intervals
 from strapdown.formats.writing import (
     SECOND,
@@ -152,7 +153,7 @@ def _begins_with_fixes(path: Path) -> bool:
     if not lines or len(lines[0]) not in (len(NAMES), len(WITH_VELOCITY)):
         return False
     signed = sum(any(f.startswith(b"-") for f in line[4:7]) for line in lines)
-    return 2 * signed <= len(lines) and all(csv.is_data(f.decode("latin-1")) for f in lines[0])
+    return 2 * signed <= len(lines) and all(is_data(f.decode("latin-1")) for f in lines[0])
 
 
 detect_fixes = Signs(

@@ -25,6 +25,7 @@ from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.join import OwnClock, at_stamps, in_seconds
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import head
+from strapdown.formats.text_columns import decoded, fields_of
 from strapdown.tables import trajectory_table
 
 
@@ -35,7 +36,7 @@ def under(path: Path, skip: int = 0, header: str | None = None, drop: int = 0) -
     further lines under its names that are not data. Rows are counted as in the file. DataError: the
     text ends before its table, or as `csv.parse`.
     """
-    text, found = csv.decoded(path.read_bytes(), path.name)
+    text, found = decoded(path.read_bytes(), path.name)
     lines = text.split("\n")
     if len(lines) <= skip + drop + 1:
         raise DataError("io.csv-without-rows", file=path.name, row=len(lines))
@@ -87,7 +88,7 @@ def from_json(path: Path) -> Any:
 
     DataError: it is not JSON, or nested too deeply.
     """
-    text, _ = csv.decoded(path.read_bytes(), path.name)
+    text, _ = decoded(path.read_bytes(), path.name)
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:
@@ -99,7 +100,7 @@ def from_json(path: Path) -> Any:
 def names_of(path: Path) -> list[str]:
     """Return the names in the first line, for format detection."""
     lines = head(path).splitlines()
-    return csv.fields_of(lines[0], csv.separator_of(lines[0])) if lines else []
+    return fields_of(lines[0]) if lines else []
 
 
 def lacking(path: Path, stream: str, title: str, streams: Iterable[str]) -> DataError:

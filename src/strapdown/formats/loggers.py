@@ -19,13 +19,14 @@ from strapdown.formats.clocks import GPS_EPOCH, UNIX, WEEK, leap_seconds
 from strapdown.formats.known_formats import column, lacking, selected, stated_by
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs
+from strapdown.formats.text_columns import decoded
 from strapdown.units import OF_TABLES, SPEEDS, unit_of
 
 Array = NDArray[np.float64]
 
 
 def _lines(path: Path) -> list[str]:
-    text, _ = csv.decoded(path.read_bytes(), path.name)
+    text, _ = decoded(path.read_bytes(), path.name)
     return text.splitlines()
 
 

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding, add_note, add_warning
-from strapdown.formats import csv
 from strapdown.formats.crash_record import (
     CHANGE_NOTE,
     DEFORMS,
@@ -27,6 +26,7 @@ from strapdown.formats.crash_record import (
     unique,
 )
 from strapdown.formats.mme_codes import DIMENSIONS, DUMMIES, NO_CLASS, MmeCode, decode_mme
+from strapdown.formats.text_columns import decoded
 from strapdown.tables import SAMPLINGS
 from strapdown.units import FACTORS, OF_CRASHES, TIME_UNITS, find_unit
 
@@ -660,7 +660,7 @@ def text_of(path: Path, longest: int = LARGEST) -> str:
         data = stream.read(longest)
     if len(data) == longest:
         data = data[: data.rfind(b"\n") + 1]
-    text = csv.decoded(data, path.name)[0]
+    text = decoded(data, path.name)[0]
     if "\0" in text:
         raise DataError("io.mme-with-zero-bytes", file=path.name)
     return text

@@ -35,11 +35,11 @@ import pandas as pd
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding, add_note
-from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK, Clock
 from strapdown.formats.known_formats import Quantities, damage, or_sentences, solution
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs, first_bytes
+from strapdown.formats.text_columns import decoded
 from strapdown.units import LENGTHS
 
 TITLE = "NovAtel OEM log, binary or text"
@@ -325,7 +325,7 @@ detect_explorer = Signs(
 def read_explorer_reference(path: Path) -> pd.DataFrame:
     """Read position, velocity and attitude."""
     with damage(path):
-        text, findings = csv.decoded(path.read_bytes(), path.name)
+        text, findings = decoded(path.read_bytes(), path.name)
         values = _values(path, text.splitlines())
     names = ("gpstime", *PLACE, *ANGLES)
     velocity = next((v for v in (LEVEL, BODY) if set(v) <= values.keys()), LEVEL)

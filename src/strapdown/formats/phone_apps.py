@@ -30,6 +30,7 @@ from strapdown.formats.known_formats import (
 )
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
+from strapdown.formats.text_columns import fields_of
 from strapdown.units import OF_TABLES, unit_of
 
 # Tables of Core Motion (iOS, watchOS): rotation rate, gravity and user acceleration apart.
@@ -364,7 +365,7 @@ def _table_of_racechrono(path: Path) -> tuple[RawLog, dict[str, str]]:
     top = next((k for k, line in enumerate(lines) if line.startswith("timestamp,")), None)
     if top is None or len(lines) < top + 3 or not lines[top + 1].startswith("unix time"):
         raise DataError("io.racechrono-header", file=path.name, row=(top or 0) + 1)
-    names, units, sources = (csv.fields_of(lines[top + k], ",") for k in range(3))
+    names, units, sources = (fields_of(lines[top + k], ",") for k in range(3))
     if not len(names) == len(units) == len(sources):
         raise DataError("io.racechrono-header", file=path.name, row=top + 1)
     full = [

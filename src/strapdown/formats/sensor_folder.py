@@ -22,6 +22,7 @@ from strapdown.formats.inference.conclusion import EPOCH
 from strapdown.formats.join import join
 from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.formats.signs import Signs, while_unchanged
+from strapdown.formats.text_columns import fields_of
 from strapdown.formats.vocabularies import WITHOUT_GRAVITY
 from strapdown.parsers import parse
 from strapdown.units import TIME_UNITS
@@ -83,7 +84,7 @@ def _triad(member: Member) -> str | None:
 
 def _has_axes(member: Member) -> bool:
     line = first_line(member)
-    fields = csv.fields_of(line, csv.separator_of(line))
+    fields = fields_of(line)
     return sorted(m[1].lower() for f in fields if (m := _AXIS.fullmatch(f.strip()))) == [*AXES]
 
 

@@ -44,6 +44,7 @@ from strapdown.formats.sensor_folder import (
     peek,
 )
 from strapdown.formats.signs import Signs, head
+from strapdown.formats.text_columns import decoded
 
 TIME = ("time", "ns")
 GYROS = ("Gyroscope", "GyroscopeUncalibrated")
@@ -191,7 +192,7 @@ def _require(name: str, columns: dict[str, NDArray[Any]]) -> None:
 
 
 def _records(path: Path) -> tuple[list[dict[str, Any]], list[Finding]]:
-    text, found = csv.decoded(path.read_bytes(), path.name)
+    text, found = decoded(path.read_bytes(), path.name)
     try:
         records = json.loads(text)
     except json.JSONDecodeError as error:

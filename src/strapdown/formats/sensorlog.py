@@ -40,6 +40,7 @@ from strapdown.formats.known_formats import (
 from strapdown.formats.recording import RawLog
 from strapdown.formats.sensor_folder import file_member, first_line
 from strapdown.formats.signs import Signs
+from strapdown.formats.text_columns import fields_of
 
 MOTION, GYRO, FORCE = "motionRotationRate", "gyroRotation", "accelerometerAcceleration"
 USER, GRAVITY = "motionUserAcceleration", "motionGravity"
@@ -73,7 +74,7 @@ ZONE = 900.0  # s
 def _has_gyro(path: Path) -> bool:
     """Whether the first line names the columns of a gyro, with their unit."""
     line = first_line(file_member(path))
-    names = set(csv.fields_of(line, csv.separator_of(line)))
+    names = set(fields_of(line))
     return csv.detect(path) and any(set(_three(kind, RADIANS)) <= names for kind in (MOTION, GYRO))
 
 

@@ -13,11 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from strapdown.errors import DataError, add_note
-from strapdown.formats.csv import SUFFIXES, decoded
+from strapdown.formats.csv import SUFFIXES
 from strapdown.formats.join import join
 from strapdown.formats.known_formats import force_of, sensor_log
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, first_bytes
+from strapdown.formats.text_columns import decoded
 
 # Number of values in a block, by its id: 1 GPS, 3 accelerometer, 4 gyroscope, 5 magnetic field,
 # 6 GPS in ECEF, 7 GPS velocity, 81 orientation, 82 linear acceleration, 83 gravity, 84 rotation

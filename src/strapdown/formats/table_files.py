@@ -28,6 +28,7 @@ from strapdown.formats.phone_apps import with_force_summed
 from strapdown.formats.recording import RawLog
 from strapdown.formats.sensor_folder import first_line, peek
 from strapdown.formats.signs import Signs, first_bytes, head
+from strapdown.formats.text_columns import NUMBER, decoded, fields_of
 from strapdown.formats.vocabularies import FIXES
 from strapdown.parsers import parse
 from strapdown.parsers.archives import PACKED, numpy_array
@@ -88,7 +89,7 @@ def _holds_one(path: Path) -> bool:
     if len(members) != 1 or read_name(f"{members[0].stem} x").quantity is not None:
         return False  # of one sensor, which `sensor_folder` reads
     line = first_line(members[0])
-    return line[:1] in tuple("[{") or len(csv.fields_of(line, csv.separator_of(line))) > 3
+    return line[:1] in tuple("[{") or len(fields_of(line)) > 3
 
 
 detect_packed = Signs(also=_holds_one)
@@ -486,7 +487,7 @@ def _objects(
     path: Path, whole: Any = None
 ) -> tuple[list[dict[str, Any]], list[int], list[Finding]]:
     """Return the objects, each with its line or its number in the list; `whole`: parsed before."""
-    text, findings = csv.decoded(path.read_bytes(), path.name)
+    text, findings = decoded(path.read_bytes(), path.name)
     inside = _MEMBER.match(text.lstrip()) and "}\n{" not in text
     if text.lstrip().startswith("[") or inside:
         content = from_json(path) if whole is None else whole
@@ -572,7 +573,7 @@ detect_labview = Signs(text=rf"\A{LABVIEW_MAGIC}")
 
 def read_labview_table(path: Path) -> RawLog:
     """Read the channels, with the units that the header states."""
-    text, _ = csv.decoded(path.read_bytes(), path.name)
+    text, _ = decoded(path.read_bytes(), path.name)
     lines = text.split("\n")
     ends = [k for k, line in enumerate(lines) if line.startswith(END)]
     if len(ends) != 2 or len(lines) < ends[1] + 3:
@@ -589,7 +590,7 @@ def read_labview_table(path: Path) -> RawLog:
         raw.units |= dict(zip(channels, units, strict=True))
     raw.units |= {"time": "s"} if "time" in raw.columns else {}
     step = next(iter(said.get("Delta_X", ())), "").replace(",", ".")
-    stated = csv.NUMBER.fullmatch(step) is not None and 1e-9 < float(step) < 1e9
+    stated = NUMBER.fullmatch(step) is not None and 1e-9 < float(step) < 1e9
     if "time" not in raw.columns and stated:
         raw.rate = 1.0 / float(step)
     return raw

@@ -1,11 +1,15 @@
-"""Lines of a text with equally many fields as columns, by pyarrow: each number the nearest double.
+"""A text as lines, fields and columns: encodings, comments, separators, quotes, numbers.
 
+Lines with equally many fields are read as columns by pyarrow, each number the nearest double:
 `columns_at_once` reads a regular table block by block, from a file without holding it in memory;
 `parsed` reads lines whose irregularities are known.
 """
 
 from __future__ import annotations
 
+import codecs
+import itertools
+import re
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -17,9 +21,30 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.errors import DataError, Finding
+from strapdown.formats.arrays import is_stamp
 from strapdown.tables import on_disk
 
 Columns = list[NDArray[Any]]
+#: Lines with their rows.
+Lines = list[tuple[int, str]]
+COMMENTS = ("#", "%", "//", "!")
+#: Signs at the beginning of a comment, of each of which there may be several.
+MARKS = "#%/;!"
+_SEPARATOR = re.compile(r"sep=.?", re.I)
+#: A number with a point and without a sign, as a part of other expressions.
+UNSIGNED = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+#: A number, with a point or a comma; and that or not a number.
+NUMBER = re.compile("[+-]?" + UNSIGNED.replace(r"\.", "[.,]"))
+NUMBER_OR_NAN = re.compile(rf"{NUMBER.pattern}|[+-]?nan|[+-]?inf(inity)?", re.I)
+HEXADECIMAL = re.compile(r"[+-]?0x[0-9a-f]+", re.I)
+# Numbers with a decimal comma, separated by blanks.
+_COMMA = r"[+-]?\d+(?:,\d+)?(?:[eE][+-]?\d+)?"
+_COMMAS = re.compile(rf"{_COMMA}(\s+{_COMMA})+")
+#: Lines at the top of a text that are searched, and the fields of each that are judged.
+SEARCHED, JUDGED = 400, 200
+#: Most fields of a row; no log has more, and a damaged line may.
+MOST_COLUMNS = 10_000
 #: Texts of missing values.
 NULLS = (
     *("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "n/a", "NULL", "null", "None", "NaT"),
@@ -35,6 +60,137 @@ KEPT = 1 << 18
 _ODD = (b"\0", b"\x0b", b"\x0c", b"\x1c", b"\x1d", b"\x1e")
 # Types of numbers; each holds those before it.
 _WIDER = ("null", "int64", "double")
+
+
+def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
+    """Decode the text of a file and collect findings.
+
+    UTF-16 is known by its mark, or by null bytes at every second byte of a text in ASCII.
+    DataError: the content is not text.
+    """
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16", "replace"), []
+    top = data[:4096]
+    if b"\0" in top:
+        for first, code in ((1, "utf-16-le"), (0, "utf-16-be")):
+            if len(top) > 20 and not any(top[first::2]) and b"\0" not in top[1 - first :: 2]:
+                return data.decode(code, "replace"), []
+        raise DataError("io.text-with-zero-bytes", file=name)
+    try:
+        return without_second_encoding(data.decode("utf-8-sig"), name)
+    except UnicodeDecodeError as error:
+        return data.decode("cp1252", "replace"), [
+            Finding("io.not-utf-8", file=name, severity="note", byte=error.start)
+        ]
+
+
+#: Codes in which programs read UTF-8 by mistake.
+_MISTAKEN = ("cp1252", "cp1251")
+
+
+def without_second_encoding(text: str, name: str) -> tuple[str, list[Finding]]:
+    """Repair lines at the top that are UTF-8 read in another code, and written in UTF-8 again.
+
+    ``Â°/s`` is the degree in cp1252. Letters of no other text make UTF-8 in such a code, so that
+    every line with such letters has to, in the same.
+    """
+    cut = text.find("\n", 1 << 13)
+    top = text if cut < 0 else text[:cut]
+    odd = [line for line in top.split("\n") if not line.isascii()]
+    for code in _MISTAKEN if odd else ():
+        try:
+            right = {line: _bytes_of(line, code).decode("utf-8") for line in odd}
+        except UnicodeError:
+            continue
+        lines = [right.get(line, line) for line in top.split("\n")]
+        wrong, said = odd[0].strip()[:60], right[odd[0]].strip()[:60]
+        found = Finding(
+            "io.text-decoded-twice", severity="note", file=name, wrong=wrong, right=said
+        )
+        return "\n".join(lines) + text[len(top) :], [found]
+    return text, []
+
+
+def _bytes_of(line: str, code: str) -> bytes:
+    """Encode a line; signs of control that the code does not have are themselves."""
+    return b"".join(
+        bytes([ord(c)]) if 0x80 <= ord(c) < 0xA0 else c.encode(code, "strict") for c in line
+    )
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line is a comment, or Excel's ``sep=;``.
+
+    A semicolon begins a comment where it does not separate fields.
+    """
+    text = line.strip()
+    if text.startswith(COMMENTS) or _SEPARATOR.fullmatch(text):
+        return True
+    return text.startswith(";") and ";" not in text.lstrip(";")
+
+
+def is_data(field: str) -> bool:
+    """Whether a field is a number, a date, a time of day, or missing; not a name."""
+    if len(field) > 64:
+        return False
+    number = NUMBER_OR_NAN.fullmatch(field) or HEXADECIMAL.fullmatch(field)
+    return field in NULLS or number is not None or is_stamp(field)
+
+
+def separator_of(line: str) -> str | None:
+    """Return the separator of a line; None for any run of blanks."""
+    for candidate in ("\t", ";"):
+        if candidate in line:
+            return candidate
+    # Between bars, a name may hold a comma; between commas, bars mean a norm.
+    if line.count("|") > max(1, line.count(",") - 1):
+        return "|"
+    return None if "," not in line or _COMMAS.fullmatch(line.strip()) else ","
+
+
+def fields_of(line: str, separator: str | None = "") -> list[str]:
+    """Split a line into fields, without the blanks and quotes around them.
+
+    `separator`: by default that of the line. Quotes that do not close are text.
+    """
+    if separator == "":
+        separator = separator_of(line)
+    if separator is not None and '"' in line:
+        import csv
+
+        with suppress(csv.Error):  # of a quote that does not close, or a field too long
+            return [f.strip() for f in next(csv.reader([line], delimiter=separator))]
+    return [f.strip() for f in line.split(separator)]
+
+
+def are_data(fields: list[str]) -> bool:
+    """Whether half of the fields that are there are data; of many fields, the first."""
+    full = [f for f in fields if f][:JUDGED]
+    return bool(full) and 2 * sum(map(is_data, full)) >= len(full)
+
+
+def numbered_lines(text: str, name: str = "") -> tuple[Lines, list[str]]:
+    """Split into non-blank lines with their row numbers, and the comments at the top.
+
+    `name`: for messages. DataError: one of the first lines has more than `MOST_COLUMNS` fields,
+    which no log has; no pattern is searched in it.
+    """
+    numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
+    comments = [line for _, line in itertools.takewhile(lambda n: is_comment(n[1]), numbered)]
+    numbered = numbered[len(comments) :]
+    for row, line in numbered[: SEARCHED if name else 0]:
+        if len(line) < 2 * MOST_COLUMNS:
+            continue
+        count = 1 + max(line.count(separator) for separator in ",;\t|")
+        count = count if count > MOST_COLUMNS else len(line.split(None, 2 * MOST_COLUMNS))
+        if count > MOST_COLUMNS:
+            raise DataError(
+                "io.csv-too-many-columns", file=name, row=row, count=count, most=MOST_COLUMNS
+            )
+    return numbered, comments
+
+
+# Columns of lines with equally many fields.
 
 
 def columns_at_once(

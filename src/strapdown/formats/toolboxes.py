@@ -19,6 +19,7 @@ from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.known_formats import column, lacking, under
 from strapdown.formats.recording import NoStreamError, RawLog, StatedStart
 from strapdown.formats.signs import Signs, head, while_unchanged
+from strapdown.formats.text_columns import decoded, is_comment
 from strapdown.parsers import parse
 from strapdown.rotation import dcm_from_euler
 from strapdown.tables import trajectory_table
@@ -351,10 +352,10 @@ def read_psins(path: Path) -> RawLog:
     text is read as a table.
     """
     data = path.read_bytes()
-    text, findings = csv.decoded(data, path.name)
+    text, findings = decoded(data, path.name)
     numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
-    comments = [line for _, line in numbered if csv.is_comment(line)]
-    lines = [(row, line) for row, line in numbered if not csv.is_comment(line)]
+    comments = [line for _, line in numbered if is_comment(line)]
+    lines = [(row, line) for row, line in numbered if not is_comment(line)]
     ended = text.endswith(("\n", "\r"))
     if any("psins" in c.lower() for c in comments):
         return _simu(path, lines, ended, findings)

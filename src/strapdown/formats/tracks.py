@@ -15,12 +15,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding, add_note
-from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.join import join
 from strapdown.formats.known_formats import from_json, lacking, selected
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
+from strapdown.formats.text_columns import decoded
 from strapdown.formats.writing import (
     FileOptions,
     Tables,
@@ -472,7 +472,7 @@ detect_dji = Signs(text=r"\A[\s\S]{0,4080}?\d:\d\d:\d\d[,.]\d{1,3}\s*-->", also=
 
 def read_dji_fixes(path: Path) -> RawLog:
     """Read the positions."""
-    text, findings = csv.decoded(path.read_bytes(), path.name)
+    text, findings = decoded(path.read_bytes(), path.name)
     starts = list(_TIME.finditer(text))
     ends = [*(m.start() for m in starts[1:]), len(text)]
     rows, values, lost = [], [], 0

@@ -23,6 +23,7 @@ from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import Clock, clock_of_name, with_clock
 from strapdown.formats.signs import HEAD, Signs
+from strapdown.formats.text_columns import NUMBER
 from strapdown.formats.writing import TUM_FRAMES, FileOptions
 from strapdown.frames import ecef_from_geodetic, geodetic_from_ecef, q_ne
 from strapdown.rotation import Q_NED_ENU
@@ -167,7 +168,7 @@ detect = Signs(
 def _three(text: str) -> NDArray[np.float64] | None:
     """Return latitude, longitude and height; None if a text holds anything else."""
     parts = text.split()
-    if len(parts) != 3 or not all(csv.NUMBER.fullmatch(p) and "," not in p for p in parts):
+    if len(parts) != 3 or not all(NUMBER.fullmatch(p) and "," not in p for p in parts):
         return None
     at = np.array(parts, dtype=np.float64)
     return at if np.isfinite(at).all() and abs(at[0]) <= 90.0 else None

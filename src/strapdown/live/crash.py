@@ -37,8 +37,6 @@ from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.uncertainty import TriadUncertainty, stated_uncertainty
 
-__all__ = ["CrashReception", "receive_crash", "recorder_of_case"]
-
 
 def recorder_of_case(path: Path, calibration: Path | None = None) -> WatchOptions:
     """Return the options of the first unit of a case, whose records are not read.

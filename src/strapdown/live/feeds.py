@@ -26,8 +26,6 @@ from strapdown.live.phones import phyphox_buffers, phyphox_events
 from strapdown.live.sources import LONGEST, MARK
 from strapdown.live.web import split_address
 
-__all__ = ["MqttFeed", "PhyphoxFeed", "SerialFeed", "UdpFeed"]
-
 Warn = Callable[[Finding], None]
 #: Bytes of datagrams that may wait in the system.
 WAITING = 8 << 20

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from strapdown.live.lines import BadLineError, Sample
 from strapdown.sensors.uncertainty import ImuUncertainty
 
-__all__ = ["ValueLimits", "value_limits"]
-
 #: Largest stamp, s: the year 2286, where a double resolves 2 µs.
 LATEST = 1e10
 #: The ranges of a sensor family, as ±2 to ±16 g or ±250 to ±2000 deg/s, differ at most eightfold.

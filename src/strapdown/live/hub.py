@@ -17,9 +17,9 @@ from typing import Any
 
 from strapdown import __version__
 from strapdown.errors import ConfigError, Finding, StrapdownError
+from strapdown.formats.known_formats import AXES
 from strapdown.live.lines import LINE_FORMS, BadLineError, Word, check_token
 from strapdown.live.phones import (
-    AXES,
     LineDevice,
     Message,
     SensorLoggerDevice,
@@ -28,8 +28,6 @@ from strapdown.live.phones import (
 )
 from strapdown.live.replay import RunClock
 from strapdown.live.session import Received, Session, SessionOptions
-
-__all__ = ["Hub", "StateWriter"]
 
 #: Most sessions that are open at once; after so long without a message one ends, s.
 MOST_SESSIONS, SILENT = 64, 600.0

@@ -51,8 +51,6 @@ from strapdown.formats.live_journal import (
 from strapdown.formats.sensor_streams import Event
 from strapdown.live.lines import Measured, Sample, Word
 
-__all__ = ["Journal", "Said", "SpooledRows", "received_folder", "said_of"]
-
 #: Content of a journal: what lines said, and events of phones.
 Said = Sample | Measured | Word | Event
 

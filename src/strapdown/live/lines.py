@@ -41,21 +41,6 @@ from strapdown.tables.checks import POSITION_SD, VELOCITY_SD
 if TYPE_CHECKING:
     from strapdown.live.journal import SpooledRows
 
-__all__ = [
-    "END",
-    "LINE_FORMS",
-    "AidRows",
-    "BadLineError",
-    "Measured",
-    "Sample",
-    "StateLines",
-    "Word",
-    "check_token",
-    "count_unused",
-    "parse_line",
-]
-
-
 #: Command that ends a run.
 END = "end"
 IMU, COMMAND, FORCE = "imu", "command", "accel"

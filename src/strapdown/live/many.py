@@ -25,8 +25,6 @@ from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.systems.navigation_run import make_chain
 from strapdown.systems.one_thread import one_thread
 
-__all__ = ["LiveSources", "receive_many"]
-
 #: Interval at which the run looks whether it ends, s.
 LOOK = 0.1
 

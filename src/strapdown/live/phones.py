@@ -28,7 +28,6 @@ from typing import Any
 
 from strapdown.errors import Finding, check_choice
 from strapdown.formats.columns import read_name
-from strapdown.formats.known_formats import AXES
 from strapdown.formats.sensor_streams import (
     ACCEL,
     FIX,
@@ -43,18 +42,6 @@ from strapdown.formats.sensor_streams import (
 from strapdown.formats.sensorstream import blocks_of
 from strapdown.live.lines import BadLineError, Measured, Sample, Word, parse_line
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, TIME_UNITS
-
-__all__ = [
-    "AXES",
-    "PLATFORMS",
-    "LineDevice",
-    "Message",
-    "SensorLoggerDevice",
-    "parse_sensor_logger",
-    "phyphox_buffers",
-    "phyphox_events",
-    "plain_name",
-]
 
 #: Most values of a message, and characters of a name.
 MOST_ENTRIES, LONGEST_NAME = 50_000, 40

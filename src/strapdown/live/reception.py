@@ -39,8 +39,6 @@ from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.replay import Recording
 from strapdown.systems.alignment_source import axes_matrices
 
-__all__ = ["Reception"]
-
 Array = NDArray[np.float64]
 
 #: Samples in a row that confirm a gap: without a delay of the states from 50 Hz on, as `hold_s`

@@ -27,18 +27,6 @@ from strapdown.progress import Progress, silent
 from strapdown.tables import gnss_table, imu_table
 from strapdown.tables.checks import source_of
 
-__all__ = [
-    "Latency",
-    "LatencyTape",
-    "MachineClock",
-    "Replay",
-    "RunClock",
-    "before_stamp",
-    "parse_pace",
-    "warm_up",
-]
-
-
 #: Possible delay of the end of a sleep, s; the remaining time is waited actively.
 AWAKE = 1e-3
 

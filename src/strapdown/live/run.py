@@ -36,17 +36,6 @@ from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GNSS, GYRO
 from strapdown.tables.checks import values_of
 
-__all__ = [
-    "LiveRun",
-    "as_said",
-    "live_spec",
-    "phone_aid",
-    "receive",
-    "replay_session",
-    "result_of",
-    "write_received",
-]
-
 
 @dataclass(frozen=True, eq=False)
 class LiveRun:

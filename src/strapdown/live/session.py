@@ -32,8 +32,6 @@ from strapdown.rotation import quaternion_from_euler
 from strapdown.systems.navigation_run import make_chain
 from strapdown.tables import EULER
 
-__all__ = ["Received", "Session", "SessionOptions"]
-
 #: Input from a device: events of its sensors, measurements and commands of lines.
 Received = Event | Measured | Word
 State = dict[str, Any]

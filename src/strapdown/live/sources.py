@@ -16,8 +16,6 @@ from urllib.parse import urlsplit
 from strapdown.errors import ConfigError
 from strapdown.live.replay import RunClock
 
-__all__ = ["LineSource", "ReceivedLine", "bound_socket", "open_source", "token_or_drawn"]
-
 #: Most waiting lines; beyond them a pipe blocks, and the system drops datagrams.
 WAITING = 20_000
 #: Longest line, bytes; of a longer one the begin is kept, marked so that no parser accepts it.

@@ -20,8 +20,6 @@ from strapdown.errors import ConfigError
 from strapdown.live.hub import Hub
 from strapdown.live.sources import bound_socket
 
-__all__ = ["WebReceiver", "is_loopback", "listening_socket", "local_address", "web_library"]
-
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Any]]
 Send = Callable[[Any], Awaitable[None]]

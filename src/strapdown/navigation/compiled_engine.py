@@ -37,8 +37,6 @@ from strapdown.navigation.engine import LARGEST_GROUP, SAME_INSTANT, Engine, Eng
 from strapdown.navigation.measurements.gnss import POSITION_CODE
 from strapdown.navigation.measurements.measurement import Epochs
 
-__all__ = ["CompiledEngine", "ReferenceEngine", "compiled"]
-
 Array = NDArray[np.float64]
 
 # Exactly these types: a subclass may behave differently.

@@ -21,24 +21,6 @@ from strapdown.dsp.chi_square import (
 from strapdown.errors import ConfigError, Finding
 from strapdown.navigation.record import innovation_labels
 
-__all__ = [
-    "GROSS",
-    "Alarm",
-    "ComponentConsistency",
-    "Inconsistency",
-    "InnovationMonitor",
-    "MonitorState",
-    "ObservationConsistency",
-    "Verdict",
-    "consistency_of",
-    "consistency_of_all",
-    "gross_of",
-    "inconsistencies",
-    "judge",
-    "whiteness",
-]
-
-
 Array = NDArray[np.float64]
 
 #: An innovation beyond so many standard deviations, of those that are usual in the run, is a gross

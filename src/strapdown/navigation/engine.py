@@ -31,16 +31,6 @@ from strapdown.estimation.covariance import Innovations, Observation
 from strapdown.estimation.error_filter import ErrorFilter, FilterState, Rules
 from strapdown.estimation.error_model import PHYSICAL
 
-__all__ = [
-    "LARGEST_GROUP",
-    "Engine",
-    "EngineState",
-    "GeneralEngine",
-    "LostCovarianceError",
-    "NodeRows",
-]
-
-
 Array = NDArray[np.float64]
 
 #: An epoch this close to the end of a step counts as at the end, s: time stamps are rounded decimal

@@ -10,8 +10,6 @@ from strapdown.estimation.covariance import COVARIANCES, CovarianceForm, UpdateR
 from strapdown.estimation.error_model import ErrorModel, RotationVectorModel
 from strapdown.tables.checks import is_number
 
-__all__ = ["DAMPINGS", "ClosedLoop", "Correction", "FilterOptions", "NoCorrection", "OpenLoop"]
-
 
 @dataclass(frozen=True)
 class FilterOptions:

@@ -35,18 +35,6 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import GEODETIC, GYRO, VELOCITY
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = [
-    "SHORTEST",
-    "Compass",
-    "Manoeuvre",
-    "compasses_of",
-    "manoeuvres_from",
-    "north_within",
-    "sd_after",
-    "seen_rests",
-]
-
-
 Array = NDArray[np.float64]
 
 #: Two-sided 99 % quantiles of Student's t, with one degree of freedom to three.

@@ -57,22 +57,6 @@ from strapdown.tables.checks import index_of, source_of, values_of
 if TYPE_CHECKING:
     from strapdown.navigation.pipeline import NavigationPipeline, PipelineState
 
-__all__ = [
-    "align",
-    "errors_by_antenna",
-    "fixes_until",
-    "from_alignment",
-    "from_fine",
-    "from_state",
-    "handed_over",
-    "here_by_fix",
-    "motion_by_fixes",
-    "rest_by_fixes",
-    "site_of_fixes",
-    "unused_fixes",
-]
-
-
 Array = NDArray[np.float64]
 
 # Rows of the displacement in the covariance of an alignment that estimates the position.

@@ -58,17 +58,6 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import EULER, TRAJECTORY, on_disk
 from strapdown.tables.checks import index_of, values_of, view_of
 
-__all__ = [
-    "LONGEST",
-    "UNSEEN",
-    "HeadingChecks",
-    "agreeing_sources",
-    "carry_headings",
-    "heading_checks_of",
-    "run_heading_checks",
-]
-
-
 Array = NDArray[np.float64]
 
 #: Standard deviation of a practically unknown heading, deg; linearization fails beyond it.

@@ -22,21 +22,6 @@ from strapdown.constants import TWO_SIDED_95
 from strapdown.errors import ConfigError
 from strapdown.navigation.record import NavigationRecord, innovation_labels
 
-__all__ = [
-    "CHECKS",
-    "REASONS",
-    "STATUSES",
-    "SURE",
-    "HeadingCheck",
-    "HeadingIntegrity",
-    "StatusSpan",
-    "doubts_of",
-    "heading_status",
-    "recent_scatter",
-    "seconds_of",
-]
-
-
 Array = NDArray[np.float64]
 
 #: Status of the heading, in the order of the codes in a table.

@@ -62,18 +62,6 @@ from strapdown.progress import Progress
 from strapdown.tables import POSITION_SD, TRAJECTORY, VELOCITY_SD
 from strapdown.tables.checks import index_of, values_of, view_of
 
-__all__ = [
-    "Advice",
-    "IntegrityReport",
-    "QuantityIntegrity",
-    "Repeated",
-    "assess_integrity",
-    "likelihood_gain",
-    "quantity_status",
-    "repeat_without",
-]
-
-
 Array = NDArray[np.float64]
 
 #: Most spans with advice, and their least length, s.

@@ -17,19 +17,6 @@ from strapdown.navigation.record import Event, NavigationChunk, Span
 from strapdown.rotation import euler_from_quaternion
 from strapdown.tables.checks import is_number
 
-__all__ = [
-    "Aligned",
-    "CoarseMode",
-    "Command",
-    "FineMode",
-    "KnownStart",
-    "Mode",
-    "Navigation",
-    "PipelineChunk",
-    "Until",
-    "check_timeline",
-]
-
 
 @dataclass(frozen=True)
 class Command:

@@ -77,9 +77,6 @@ from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty
 if TYPE_CHECKING:
     from strapdown.navigation.smoother import RauchTungStriebel
 
-__all__ = ["EpochLoop", "Navigator", "NavigatorState", "Reference", "with_states"]
-
-
 Array = NDArray[np.float64]
 
 

@@ -20,21 +20,6 @@ from strapdown.navigation.record import NavigationChunk
 from strapdown.navigation.recorder import record_of
 from strapdown.progress import Progress, silent
 
-__all__ = [
-    "QUANTITIES",
-    "Forecast",
-    "Go",
-    "Share",
-    "Source",
-    "courses",
-    "covariance_over",
-    "forecast",
-    "scaled",
-    "sources_of",
-    "variances",
-]
-
-
 Array = NDArray[np.float64]
 
 #: Runs a navigator from a state over the samples of an outage.

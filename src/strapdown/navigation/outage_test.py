@@ -30,26 +30,6 @@ from strapdown.progress import Progress
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = [
-    "IMPROBABLE",
-    "SETTLED",
-    "OutageVerdict",
-    "Withheld",
-    "WithheldRun",
-    "WithheldScore",
-    "Withholding",
-    "blinded",
-    "end_of_what_tells",
-    "judge_outages",
-    "score_by_truth",
-    "score_of",
-    "score_of_smoothed",
-    "score_withholding",
-    "spans_to_withhold",
-    "withheld_runs",
-]
-
-
 Array = NDArray[np.float64]
 
 

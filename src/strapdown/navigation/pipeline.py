@@ -38,15 +38,6 @@ from strapdown.navigation.record import Event, GrowingRows, InnovationRecord, Na
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables.checks import is_number
 
-__all__ = [
-    "MeasurementMonitor",
-    "MeasurementMonitorState",
-    "ModeSequencer",
-    "NavigationPipeline",
-    "PipelineState",
-]
-
-
 # Monitor measurements: outages, recoveries, rejected and late observations.
 
 

@@ -27,24 +27,6 @@ from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, is_number, values_of
 from strapdown.tables.on_disk import let_go
 
-__all__ = [
-    "NEAR",
-    "FilteringState",
-    "GapPolicy",
-    "Hole",
-    "ImuIncrements",
-    "ImuPreprocessor",
-    "ImuPreprocessorState",
-    "RangeEnds",
-    "RangeState",
-    "ends_of",
-    "hole_between",
-    "joined_steps",
-    "steps_of",
-    "widened",
-]
-
-
 # The steps of a record, unchanged or joined to tenths of a second.
 
 

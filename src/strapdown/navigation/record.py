@@ -22,23 +22,6 @@ from strapdown.tables import (
 )
 from strapdown.tables.checks import as_array
 
-__all__ = [
-    "CovarianceSnapshot",
-    "CovarianceSnapshots",
-    "Event",
-    "GrowingRows",
-    "InnovationColumns",
-    "InnovationRecord",
-    "InnovationRecords",
-    "NavigationChunk",
-    "NavigationRecord",
-    "Span",
-    "innovation_labels",
-    "standard_deviations",
-    "state_of_row",
-]
-
-
 Array = NDArray[np.float64]
 
 

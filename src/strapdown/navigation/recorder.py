@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from strapdown.mechanization.mechanization import Mechanization
     from strapdown.navigation.smoother import Smoothed, Smoothing
 
-__all__ = ["RECORDERS", "FullRecorder", "IntervalRecorder", "Recorder", "Tape", "record_of"]
-
 Array = NDArray[np.float64]
 
 # A time stamp within this fraction of the interval counts as on the grid.

@@ -19,8 +19,6 @@ from strapdown.navigation.record import innovation_labels
 from strapdown.tables import GEODETIC
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["Wrong", "longest", "wrong_stretches"]
-
 Array = NDArray[np.float64]
 
 #: Parts of a stretch after which its noise is told of.

@@ -24,17 +24,6 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO, check_imu, on_disk
 from strapdown.tables.checks import check_columns, source_of, values_of
 
-__all__ = [
-    "PipelineRun",
-    "Recording",
-    "pieces_by_sample",
-    "pieces_of",
-    "relinearized",
-    "run_batch",
-    "run_by_sample",
-]
-
-
 Array = NDArray[np.float64]
 
 #: Length of a chunk of a record, s.

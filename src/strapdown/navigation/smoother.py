@@ -35,9 +35,6 @@ from strapdown.navigation.record import CovarianceSnapshots, GrowingRows, Naviga
 from strapdown.tables import on_disk
 from strapdown.tables.checks import is_number
 
-__all__ = ["SMOOTHERS", "RauchTungStriebel", "Smoothed", "Smoothing", "SmoothingTape"]
-
-
 Array = NDArray[np.float64]
 
 #: Tolerance of the time of a mark, s: before an observation it is a microsecond earlier.

@@ -48,26 +48,6 @@ from strapdown.tables.on_disk import let_go_of_all, parts_of
 if TYPE_CHECKING:
     from strapdown.simulation.earth_motion import EarthMotion
 
-__all__ = [
-    "COMPONENTS",
-    "PARTS",
-    "SHARE",
-    "SmootherConsistency",
-    "SolutionScore",
-    "TruthComparison",
-    "band_of_mean",
-    "bounds",
-    "compare_with_places",
-    "compare_with_truth",
-    "independent_errors",
-    "normalised_squares",
-    "rows_of_marks",
-    "smoother_consistency",
-    "state_errors",
-    "time_shares",
-]
-
-
 Array = NDArray[np.float64]
 
 #: Physical errors, in the order of `mechanization.state_error.state_error`, and their units.

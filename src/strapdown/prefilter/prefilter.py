@@ -18,21 +18,6 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.tables import ACCEL, GYRO, MOTION, check_imu, check_motion_increments
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = [
-    "CHANNELS",
-    "Changed",
-    "Grid",
-    "NoPrefilter",
-    "Portion",
-    "Prefilter",
-    "PrefilterReport",
-    "Prefiltered",
-    "grid_of",
-    "report_of",
-    "whole_factor",
-]
-
-
 Array = NDArray[np.float64]
 
 CHANNELS = [*GYRO, *ACCEL]

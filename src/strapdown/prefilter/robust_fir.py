@@ -15,8 +15,6 @@ from strapdown.prefilter.prefilter import Changed, Grid, Portion, Prefilter, who
 
 Array = NDArray[np.float64]
 
-__all__ = ["RobustFir", "RobustFirState"]
-
 
 @dataclass(frozen=True, eq=False)
 class RobustFirState:

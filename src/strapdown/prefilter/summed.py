@@ -14,8 +14,6 @@ from strapdown.prefilter.prefilter import Changed, Grid, Portion, Prefilter, who
 
 Array = NDArray[np.float64]
 
-__all__ = ["Summed", "SummedState"]
-
 
 @dataclass(frozen=True, eq=False)
 class SummedState:

@@ -20,8 +20,6 @@ from strapdown.prefilter.prefilter import Changed, Grid, Portion, Prefilter, who
 
 Array = NDArray[np.float64]
 
-__all__ = ["RobustWd", "RobustWdState"]
-
 # Samples at the start from which the noise is estimated.
 SETTLE = 256
 # Samples with less weight count as replaced: residuals beyond 5.4 of Huber's standard deviations.

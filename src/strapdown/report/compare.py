@@ -65,15 +65,6 @@ from strapdown.units import SHOWN_UNITS
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = [
-    "COMPARE",
-    "NumberRow",
-    "RunComparison",
-    "compare_results",
-    "comparison_json",
-    "units_of",
-]
-
 #: Instants that differ by less are the same, s.
 SAME_INSTANT = 1e-6
 #: Difference of two numbers that is rounding alone: relative to them, and in units of `FINE`.

@@ -21,24 +21,6 @@ from strapdown.bundle import (
 from strapdown.errors import DataError, Finding
 from strapdown.report.content import json_of
 
-__all__ = [
-    "Condition",
-    "FoundCode",
-    "InputRow",
-    "OptionRow",
-    "RunPart",
-    "SealedRun",
-    "conditions",
-    "found_codes",
-    "input_rows",
-    "open_part",
-    "open_run",
-    "option_rows",
-    "options_of",
-    "seconds",
-    "shown_names",
-]
-
 #: By command the JSON of its answer.
 ANSWERS = {
     "navigate": "navigation.json",

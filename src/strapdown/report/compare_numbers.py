@@ -20,8 +20,6 @@ from strapdown.report.values import AXES, shares_words
 from strapdown.tables import EULER, NED, VELOCITY
 from strapdown.units import SPEEDS
 
-__all__ = ["OF_THE_UNIT", "Value", "is_over_ground", "values_of"]
-
 #: Group of what is a property of the unit that recorded, and no error of the result.
 OF_THE_UNIT = "Estimated sensor errors"
 Place = tuple[float, float, float]

@@ -29,17 +29,6 @@ from strapdown.report.compare_numbers import is_over_ground
 from strapdown.report.crash_case import table_in
 from strapdown.tables import EULER, NED, QUATERNION, VELOCITY
 
-__all__ = [
-    "Curve",
-    "Difference",
-    "DifferenceScore",
-    "Track",
-    "curves_of",
-    "differences",
-    "plain_scores",
-    "tracks_of",
-]
-
 Array = NDArray[np.float64]
 
 #: Files of a trajectory with velocity and attitude, the best first.

@@ -37,8 +37,6 @@ from strapdown.formats import read_raw
 from strapdown.formats.signs import first_bytes
 from strapdown.parsers.process import parse
 
-__all__ = ["EQUAL", "Comparison", "compare_files"]
-
 #: A long integration amplifies rounding. A larger difference is a different result.
 EQUAL = 1e-6
 #: Latitude and longitude: a tenth of a millimetre.

@@ -48,16 +48,6 @@ from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.tables import ACCEL, GYRO, MAG
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = [
-    "CalibrationConditions",
-    "CalibrationRecord",
-    "ImuCalibration",
-    "KnownRotation",
-    "SensorCalibration",
-    "calibrate_imu",
-    "in_accel_axes",
-]
-
 Array = NDArray[np.float64]
 
 #: A parameter whose standard deviation the log has not halved is not observed.

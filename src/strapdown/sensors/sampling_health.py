@@ -13,8 +13,6 @@ from strapdown.errors import Finding
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = ["check_sampling", "quantization_step"]
-
 Array = NDArray[np.float64]
 
 #: Fewest steps that show a pattern.

@@ -19,9 +19,6 @@ from strapdown.sensors.triad_errors import Triad
 from strapdown.simulation.motion import Motion, check_numbers
 from strapdown.tables import GEODETIC
 
-__all__ = ["Camera", "film", "paper_cameras", "path_from_cameras"]
-
-
 Array = NDArray[np.float64]
 
 # Stream keys below the seed of a camera.

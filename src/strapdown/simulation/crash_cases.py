@@ -27,8 +27,6 @@ from strapdown.simulation.crash_recording import (
 )
 from strapdown.simulation.mounted_motion import point_path
 
-__all__ = ["CASES", "CaseRecorder", "CrashCase", "find_case"]
-
 
 @dataclass(frozen=True)
 class CaseRecorder:

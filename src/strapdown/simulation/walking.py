@@ -28,8 +28,6 @@ from strapdown.simulation.earth_motion import (
 from strapdown.simulation.motion import Track, check_numbers, euler_attitude, euler_body_rate
 from strapdown.simulation.path_motion import MOST_PITCH
 
-__all__ = ["GAITS", "Gait", "Stride", "WalkingMotion", "walk"]
-
 Array = NDArray[np.float64]
 
 

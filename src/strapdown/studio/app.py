@@ -38,8 +38,6 @@ from strapdown.studio.pyramid import StoredStream
 from strapdown.studio.reading_process import ReadingProcess, Refused, told
 from strapdown.studio.samples import listed_samples
 
-__all__ = ["Studio", "make_app"]
-
 _log = logging.getLogger("strapdown")
 #: The built front end; a developer may name another.
 STATIC = Path(os.environ.get("STRAPDOWN_STUDIO_STATIC") or Path(__file__).parent / "static")

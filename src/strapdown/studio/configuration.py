@@ -34,8 +34,6 @@ from strapdown.studio.kinds import KINDS, Kind
 from strapdown.studio.questions import offered_question, open_question
 from strapdown.studio.reading_process import told
 
-__all__ = ["check", "checked", "command", "edited", "propose"]
-
 #: Configurations of the folder that are offered at most.
 MOST_READY = 5
 #: Code of a value that is still a question mark.

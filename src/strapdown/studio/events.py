@@ -19,8 +19,6 @@ from strapdown.studio.folder import Folder, plain_name
 from strapdown.studio.jobs import ENDED, Jobs
 from strapdown.studio.live_jobs import shown_state
 
-__all__ = ["Events", "states_of"]
-
 #: Seconds between two looks at the jobs, and looks at jobs between two at the folder.
 EVERY, OF_FOLDER = 0.1, 10
 #: Messages that wait for a client; one that is slower is sent away, and its page asks again.

@@ -23,8 +23,6 @@ from typing import Any
 from strapdown.bundle import MANIFEST
 from strapdown.errors import ConfigError, DataError, printable
 
-__all__ = ["STATE", "Folder", "Limits", "is_recording", "plain_name", "repeating"]
-
 #: Folder of the studio's own: jobs and what was computed of logs.
 STATE = ".strapdown-studio"
 #: Longest name, bytes of UTF-8; entries of a folder that are looked at.

@@ -18,8 +18,6 @@ from strapdown.config.spec import UNITS, Spec
 from strapdown.sensors.catalogue import SENSORS
 from strapdown.studio.kinds import KINDS
 
-__all__ = ["form_of", "kinds", "unit_of"]
-
 #: Units as a person writes them, by the ending of a key.
 SHOWN = {
     "_km_per_h": "km/h",

@@ -19,8 +19,6 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from strapdown.studio.folder import Limits
 
-__all__ = ["HEADERS", "Guard", "PatientProtocol", "allowed_hosts"]
-
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]

@@ -30,8 +30,6 @@ from strapdown.studio import job_keeper
 from strapdown.studio.folder import Folder, plain_name, repeating
 from strapdown.studio.reading_process import told
 
-__all__ = ["Job", "Jobs", "process_began"]
-
 #: Jobs at once; jobs that are remembered; jobs that may wait.
 AT_ONCE, REMEMBERED, WAITING = 2, 100, 50
 #: Time from an interrupt to the end by force, s; of a live run, which then writes what it received.

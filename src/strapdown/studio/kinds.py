@@ -46,8 +46,6 @@ from strapdown.studio.questions import (
     role_question,
 )
 
-__all__ = ["KINDS", "Draft", "Kind"]
-
 
 @dataclass(frozen=True)
 class Draft:

@@ -17,8 +17,6 @@ from strapdown.report.values import GAP, bounded, on_ground
 from strapdown.studio.configuration import LONGEST, refuse_outside
 from strapdown.studio.folder import Folder
 
-__all__ = ["PROTOCOLS", "live_command", "live_info", "shown_state"]
-
 
 @dataclass(frozen=True)
 class LiveField:

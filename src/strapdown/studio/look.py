@@ -48,8 +48,6 @@ from strapdown.tables.checks import index_of
 if TYPE_CHECKING:
     from strapdown.systems.doctor import LogDiagnosis
 
-__all__ = ["CACHE", "kept_stream", "look", "stream"]
-
 #: Most bytes of the cache; beyond, what was used last longest ago is removed.
 CACHE = 4 << 30
 #: Names of the parts of the result: gaps and rests that are listed at most.

@@ -14,8 +14,6 @@ from strapdown.formats.map_tiles import Tile, open_map
 if TYPE_CHECKING:
     from strapdown.studio.app import Studio
 
-__all__ = ["Map", "map_of"]
-
 #: Endings of maps that are looked for in the folder.
 ENDINGS = (".pmtiles", ".mbtiles")
 DEEPEST = 22

@@ -19,8 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FACTOR", "StoredStream", "least_and_largest", "levels_of", "write_stream"]
-
 Array = NDArray[np.float64]
 
 FACTOR = 16

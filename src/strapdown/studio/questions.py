@@ -14,23 +14,6 @@ from strapdown.formats.recording import PLACEHOLDERS
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
 
-__all__ = [
-    "FOOT",
-    "HEIGHTS",
-    "OF_FILES",
-    "ROLES",
-    "axes_question",
-    "either_question",
-    "foot_question",
-    "heights_question",
-    "of_each",
-    "of_file",
-    "offered_question",
-    "open_question",
-    "question_of",
-    "role_question",
-]
-
 #: Key of a table ``[log]`` of the studio that is of the fixes: their level over the ellipsoid, m.
 HEIGHTS = "datum_height_m"
 #: Keys of a table ``[log]`` of the studio: which of several files is meant, by its name; empty for

@@ -30,8 +30,6 @@ from strapdown.studio.configuration import checked
 from strapdown.studio.kinds import KINDS
 from strapdown.studio.reading_process import told
 
-__all__ = ["quick"]
-
 #: Points of the path that are shown; records that are kept.
 POINTS, MOST = 240, 32
 

@@ -24,8 +24,6 @@ from strapdown.campaign.case_process import end_with, limit_memory
 from strapdown.errors import Finding, StrapdownError
 from strapdown.parsers.limits import memory_most, seconds_most, size_of
 
-__all__ = ["ReadingProcess", "Refused", "main", "told"]
-
 #: Memory beside that of the parsers, bytes: what the packages and the tables of a log take.
 MEMORY, MEMORY_PER_BYTE = 3 << 30, 24
 #: Time beside that of the parsers, s, and s per MiB: tests of every channel of a log.

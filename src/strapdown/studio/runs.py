@@ -45,8 +45,6 @@ from strapdown.tables.checks import find_gaps, index_of
 if TYPE_CHECKING:
     from strapdown.report.compare_folders import SealedRun
 
-__all__ = ["compare", "export", "file_of_run", "run", "run_stream", "summary", "track"]
-
 #: Tables of a result with its values over time, the first that it has; and that of the standard
 #: deviations, whose stamps may be others.
 TABLES, SD = ("trajectory.csv", "attitude.csv", "error_growth.csv", "allan.csv"), "sd.csv"

@@ -18,9 +18,6 @@ from strapdown.crash.events import KMH
 from strapdown.errors import ConfigError, check_choice
 from strapdown.studio.folder import Folder
 
-__all__ = ["SAMPLES", "listed_samples", "sample"]
-
-
 #: Head of the case of the simulated crash.
 SIMULATED = "A simulated crash: what is marked as yours is the statement of the simulation."
 

@@ -15,8 +15,6 @@ from strapdown.formats.map_tiles import open_map
 from strapdown.live.sources import bound_socket
 from strapdown.studio.folder import Folder, Limits
 
-__all__ = ["Address", "serve"]
-
 #: Loopback addresses, which other machines cannot reach.
 LIMITS = Limits()
 LOOPBACK = ("127.0.0.1", "::1", "localhost")

@@ -30,9 +30,6 @@ from strapdown.systems.navigation_source import read_measured
 from strapdown.tables import ACCEL, GEODETIC, MAG, VELOCITY, VELOCITY_SD
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["Magnetic", "propose_aids", "propose_magnetometer"]
-
-
 Array = NDArray[np.float64]
 
 #: Least number of rows within the samples.

@@ -21,17 +21,6 @@ from strapdown.sensors.triad_errors import NAMED_AXES
 from strapdown.systems.alignment_source import body_record
 from strapdown.tables.checks import index_of
 
-__all__ = [
-    "ProposedAlignment",
-    "axes_table",
-    "draft_alignment",
-    "listed_kinds",
-    "log_table",
-    "options",
-    "stage",
-    "toml_value",
-]
-
 #: Grades of the catalogue with gyros for gyrocompassing, or nearly.
 GRADES = ("navigation", "tactical")
 

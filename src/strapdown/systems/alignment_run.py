@@ -43,16 +43,6 @@ from strapdown.tables.checks import index_of, source_of, values_of
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = [
-    "AlignmentReadiness",
-    "AlignmentRun",
-    "alignment_readiness",
-    "channel_findings",
-    "reference_offset",
-    "run_alignment",
-    "with_record_as_reason",
-]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AlignmentRun(SavedRun):

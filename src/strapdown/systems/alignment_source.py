@@ -34,8 +34,6 @@ from strapdown.tables.checks import values_of
 if TYPE_CHECKING:
     from strapdown.config.alignment import AlignmentSpec
 
-__all__ = ["AlignmentSource", "axes_matrices", "body_record", "read_alignment_source"]
-
 Array = NDArray[np.float64]
 
 

@@ -40,8 +40,6 @@ from strapdown.tables.on_disk import let_go
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = ["AllanRun", "run_allan"]
-
 Array = NDArray[np.float64]
 
 #: Shortest stationary stretch that is used, and one below which the result says that it is short.

@@ -20,16 +20,14 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.aid_table import but_temperature, stream_beside, temperature_of
 from strapdown.progress import Progress, silent
 from strapdown.sensors.calibration import (
-    CalibrationConditions,
-    CalibrationRecord,
     ImuCalibration,
-    KnownRotation,
     SensorCalibration,
     calibrate_imu,
     correlations,
     sealed_text,
 )
-from strapdown.sensors.calibration_model import GRAVITY, GRAVITY_SD, PRIOR
+from strapdown.sensors.calibration_model import GRAVITY, GRAVITY_SD, PRIOR, CalibrationConditions
+from strapdown.sensors.calibration_stops import CalibrationRecord, KnownRotation
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.magnetometer import (
     LEAST,
@@ -48,8 +46,6 @@ from strapdown.tables.sample_clock import sample_clock
 
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
-
-__all__ = ["CalibrateRun", "run_calibrate"]
 
 Array = NDArray[np.float64]
 

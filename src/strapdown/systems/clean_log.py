@@ -27,8 +27,6 @@ from strapdown.formats.writers import imu_columns, table_columns
 from strapdown.systems.doctor import Diagnosis, LogDiagnosis
 from strapdown.tables import POSITION_SD, QUATERNION, TRAJECTORY, VELOCITY, VELOCITY_SD
 
-__all__ = ["axes_of_clean_log", "write_clean_log"]
-
 Columns = Mapping[str, NDArray[Any]]
 Write = Callable[[Path, dict[str, NDArray[Any]], dict[str, str]], None]
 

@@ -47,8 +47,8 @@ from strapdown.formats.recording import ABSENT, PLACEHOLDERS, RawLog, Recording
 from strapdown.formats.references import read_truth
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.frames import ways_between
-from strapdown.navigation.measurements.gnss_clock import TimeOffset
-from strapdown.navigation.measurements.gnss_readiness import gnss_readiness, without_repeats
+from strapdown.navigation.measurements.gnss_clock import find_time_offset, sure_delay
+from strapdown.navigation.measurements.gnss_readiness import receiver_findings, without_repeats
 from strapdown.progress import Progress, silent
 from strapdown.sensors.health_log import LEAST_SAMPLES
 from strapdown.sensors.imu_health import ImuHealth, check_imu_channels
@@ -74,8 +74,6 @@ from strapdown.systems.navigation_proposal import (
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, MAG, POSITION_SD, find_gaps
 from strapdown.tables.checks import index_of, values_of
-
-__all__ = ["USES", "Diagnosis", "LogDiagnosis", "refused_fixes", "run_doctor"]
 
 Array = NDArray[np.float64]
 
@@ -610,21 +608,16 @@ def _fixes_against(
     found: list[Finding] = []
     if imu is None:
         try:
-            return None, list(gnss_readiness(gnss))
+            return None, receiver_findings(gnss)
         except DataError as error:
             return None, [error.finding]
-    offset: TimeOffset | None = None
-
-    def search(delay: float) -> TimeOffset | None:
-        """The offset that `init navigate` proposes."""
-        nonlocal offset
-        offset = clock_offset(without_repeats(fixes)[0], imu, delay)
-        return offset
-
     try:
         fixes, shifted = on_clock_of(gnss, imu)
         found += [shifted] if shifted else []
-        found += gnss_readiness(fixes, imu, part=log.part_s(index_of(imu)[0]), search=search)
+        found += receiver_findings(fixes, imu, part=log.part_s(index_of(imu)[0]))
+        # As `init navigate` proposes it.
+        offset = clock_offset(without_repeats(fixes)[0], imu, sure_delay(fixes))
+        found += find_time_offset(fixes, offset)
     except DataError as error:
         return None, [*found, error.finding]
     if offset is None:

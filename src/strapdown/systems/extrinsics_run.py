@@ -42,8 +42,6 @@ if TYPE_CHECKING:
     from strapdown.navigation.replay import PipelineRun
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = ["ExtrinsicsRun", "run_extrinsics"]
-
 Array = NDArray[np.float64]
 
 #: Standard normal quantile of a 95 % bound.

@@ -26,19 +26,6 @@ if TYPE_CHECKING:
     from strapdown.config.logs import LogTable
     from strapdown.config.sources import LogSpec
 
-__all__ = [
-    "NOWHERE",
-    "Memory",
-    "SavedRun",
-    "check_part",
-    "configuration_file",
-    "moved",
-    "moved_paths",
-    "part_of_log",
-    "read_options",
-    "refuse_long_span",
-]
-
 
 def check_part(from_s: float | None, to_s: float | None, duration_s: float | None) -> None:
     """Refuse an invalid part.

@@ -31,9 +31,6 @@ from strapdown.tables.on_disk import filled, let_go
 if TYPE_CHECKING:
     from strapdown.config.navigation import NavigationSpec, StartTable
 
-__all__ = ["channel_findings", "look_through", "saturated_findings"]
-
-
 #: Time in which the error of an unaided height grows by the factor e, s: sqrt(R / 2 g).
 VERTICAL = 570.0
 #: Duration from which this is reported, s.

@@ -40,9 +40,6 @@ from strapdown.systems.navigation_proposal import LOUD, NOISE_KEYS, TAKEN, Propo
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = ["STANCE", "STANDING", "draft_navigation", "first_stand", "on_foot", "second_order"]
-
-
 #: Finding of a kind of sampling that is not stated; turns are means over so many seconds.
 UNSTATED, STEADY = "io.sampling-taken-as-instantaneous", 0.5
 #: Errors of other sensors in the recording, as comments of their tables.

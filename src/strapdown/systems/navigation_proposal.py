@@ -66,9 +66,6 @@ from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["TAKEN", "Proposal", "clock_offset", "propose"]
-
-
 Array = NDArray[np.float64]
 
 #: Windows in which noise is measured, s, and the share taken as the quiet one.

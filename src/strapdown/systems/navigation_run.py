@@ -89,9 +89,6 @@ if TYPE_CHECKING:
     from strapdown.navigation.outage_test import Withheld
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = ["Drive", "NavigationRun", "make_chain", "run_navigation", "withheld_aid"]
-
-
 #: Runs a pipeline over samples and tables, with a recorder and a progress callback.
 Drive = Callable[..., PipelineRun]
 

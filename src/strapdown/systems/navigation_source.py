@@ -34,15 +34,6 @@ from strapdown.tables import GNSS, GYRO
 from strapdown.tables.checks import HEIGHTS_AS_STATED, index_of, source_of, values_of
 from strapdown.tables.sample_clock import sample_clock
 
-__all__ = [
-    "NavigationSource",
-    "in_file",
-    "read_aid",
-    "read_navigation_source",
-    "said_of_file",
-]
-
-
 #: Finding of a kind of sampling that is not stated.
 UNSTATED = "io.sampling-taken-as-instantaneous"
 #: Random stream of the fixes under a simulation's seed; those of the sensors count from zero.

@@ -74,18 +74,6 @@ from strapdown.tables.sample_clock import ends_of_part
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = [
-    "Drift",
-    "OutageRun",
-    "drift_of_sensor",
-    "forecast_of_sensor",
-    "outage_navigator",
-    "outage_of_run",
-    "run_outage",
-    "sensor_of",
-    "stated_motion",
-]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OutageRun(SavedRun):

@@ -10,8 +10,8 @@ from strapdown.errors import DataError
 from strapdown.formats import csv, read_log, read_raw, text_columns
 from strapdown.formats.arrays import epoch_of, nanoseconds_of, nanoseconds_of_epoch
 from strapdown.formats.clocks import counted
-from strapdown.formats.csv import stated_rate, stated_units
 from strapdown.formats.recording import ReadOptions
+from strapdown.formats.table_top import stated_rate, stated_units
 from strapdown.formats.text_columns import BLOCK, columns_at_once
 from strapdown.tables import ACCEL, GYRO
 
@@ -70,6 +70,7 @@ def test_counts_per_unit_above_the_table(tmp_path, said):
             {"gyro": "deg/s/65.536", "accel": "g/8192"},
         ),
         (["acc 0.061 mg/LSB"], {"accel": "0.061 mg"}),
+        (["acc 6.1e-5 g/LSB"], {"accel": "6.1e-5 g"}),
         # Not statements of a unit.
         (["gyro ±250 deg/s, accel ±2 g"], {}),
         (["sensors: gyro, accel, mag"], {}),
@@ -97,6 +98,7 @@ def test_a_name_of_a_column_is_no_statement(tmp_path):
         ("Sampling frequency (Hz): 50", 50.0),
         ("SampleRate=100", 100.0),
         ("ODR 104 Hz", 104.0),
+        ("output rate .5 Hz", 0.5),
         ("simulation output, dt = 0.02 s", 50.0),
         ("data rate: 9600 baud", None),
     ],
@@ -240,7 +242,7 @@ def test_encodings_with_and_without_a_mark(tmp_path, encoding):
 
 
 def test_too_many_columns_are_refused(tmp_path):
-    lines = [",".join(["1.0"] * (csv.MOST_COLUMNS + 1))] * 3
+    lines = [",".join(["1.0"] * (text_columns.MOST_COLUMNS + 1))] * 3
     with pytest.raises(DataError, check=coded("io.csv-too-many-columns", row=1)):
         read_log(written(tmp_path, lines))
 

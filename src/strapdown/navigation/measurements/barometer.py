@@ -25,9 +25,6 @@ from strapdown.rotation import cross_matrix
 from strapdown.tables.aiding import BAROMETER, barometer_from_pressure, check_barometer
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = ["Barometer"]
-
-
 Array = NDArray[np.float64]
 
 HOUR = 3600.0

@@ -21,16 +21,6 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GEODETIC, GYRO, VELOCITY, VELOCITY_SD
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = [
-    "ClockStep",
-    "Offsets",
-    "receiver_clock",
-    "stamp_step",
-    "step_finding",
-    "unsure_steps",
-    "window_offsets",
-]
-
 Array = NDArray[np.float64]
 
 #: Length of a window, s, and the largest number of them.

@@ -33,9 +33,6 @@ from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, is_number, source_of, values_of
 from strapdown.tables.gnss import QUALITIES
 
-__all__ = ["Gnss", "Moving", "arm_of", "moving"]
-
-
 Array = NDArray[np.float64]
 
 #: Kind of an epoch: the first of its values.

@@ -18,18 +18,6 @@ from strapdown.navigation.measurements.gnss_course import LEAST_STEPS, courses, 
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD, usable
 from strapdown.tables.checks import RELATIVE, index_of, source_of, values_of
 
-__all__ = [
-    "TimeOffset",
-    "VelocityDelay",
-    "check_overlap",
-    "find_time_offset",
-    "find_velocity_delay",
-    "sure_delay",
-    "time_offset",
-    "velocity_delay",
-]
-
-
 Array = NDArray[np.float64]
 
 WEEK = 604_800.0

@@ -18,17 +18,6 @@ from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOC
 from strapdown.tables.checks import channels_of, index_of, source_of, values_of
 from strapdown.tables.on_disk import filled
 
-__all__ = [
-    "LEAST_STEPS",
-    "TurnRatio",
-    "check_forward",
-    "check_turns",
-    "courses",
-    "forward_direction",
-    "integrals",
-    "turn_ratio",
-]
-
 Array = NDArray[np.float64]
 
 #: Number of steps of a course needed.

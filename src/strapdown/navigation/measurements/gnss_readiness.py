@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
@@ -17,7 +16,6 @@ from strapdown.navigation.measurements.clock_windows import stamp_step, step_fin
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.gnss_clock import (
     WHOLE,
-    TimeOffset,
     check_overlap,
     find_time_offset,
     find_velocity_delay,
@@ -36,26 +34,34 @@ from strapdown.tables import (
 )
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = [
-    "check_fixes",
-    "float_position_sd",
-    "gnss_readiness",
-    "lasting_position_sd",
-    "repeated_rows",
-    "white_position_sd",
-    "without_repeats",
-]
-
 
 def gnss_readiness(
     table: pd.DataFrame,
     imu: pd.DataFrame | None = None,
     aid: Gnss | None = None,
     part: tuple[float, float] = WHOLE,
-    search: Callable[[float], TimeOffset | None] | None = None,
     mounting_yaw: float | None = 0.0,
 ) -> tuple[Finding, ...]:
-    """Check fixes by themselves, and against the inertial record.
+    """Check fixes by themselves, and against the inertial record, with the offset of their clock.
+
+    Parameters and errors as of `receiver_findings`.
+    """
+    aid = aid or Gnss(name="gnss")
+    found = receiver_findings(table, imu, aid, part, mounting_yaw)
+    if imu is None:
+        return tuple(found)
+    offset = time_offset(table, imu, aid.velocity_delay or sure_delay(table))
+    return (*found, *find_time_offset(table, offset, aid.time_offset, aid.time_offset_sd))
+
+
+def receiver_findings(
+    table: pd.DataFrame,
+    imu: pd.DataFrame | None = None,
+    aid: Gnss | None = None,
+    part: tuple[float, float] = WHOLE,
+    mounting_yaw: float | None = 0.0,
+) -> list[Finding]:
+    """Check fixes by themselves, and against the inertial record on its clock.
 
     Parameters
     ----------
@@ -67,16 +73,13 @@ def gnss_readiness(
         As it is configured: options already set are not reported again.
     part : (2,), s
         Of the record that was asked for, on the clock of `imu`.
-    search : callable, optional
-        Gives the offset of the receiver's clock at a delay of its velocities, s; `time_offset`, if
-        not given.
     mounting_yaw : float, optional, rad
         Heading of the forward axis less that of the vehicle, as configured; None where nothing
         takes it to point where the body moves.
 
     Returns
     -------
-    tuple of Finding
+    list of Finding
         Each with the option or the deed that helps.
 
     Raises
@@ -90,7 +93,7 @@ def gnss_readiness(
     if aid.use_velocity and aid.use_position:
         found += find_velocity_delay(table, aid.velocity_delay)
     if imu is None:
-        return tuple(found)
+        return found
     found += check_overlap(table, imu, aid.time_offset, part)
     step = stamp_step(table)
     if step is not None and step.certain:
@@ -99,9 +102,7 @@ def gnss_readiness(
     found += check_turns(table, imu, delay)
     if mounting_yaw is not None:
         found += check_forward(table, imu, delay, mounting_yaw)
-    offset = time_offset(table, imu, delay) if search is None else search(delay)
-    found += find_time_offset(table, offset, aid.time_offset, aid.time_offset_sd)
-    return tuple(found)
+    return found
 
 
 def white_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float, float] | None:

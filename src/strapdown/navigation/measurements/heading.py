@@ -24,9 +24,6 @@ from strapdown.rotation import cross_matrix
 from strapdown.tables.aiding import HEADING, check_heading
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["Heading"]
-
-
 Array = NDArray[np.float64]
 
 

@@ -26,9 +26,6 @@ from strapdown.rotation import cross_matrix
 from strapdown.tables import MAG
 from strapdown.tables.checks import checked_values, index_of, values_of
 
-__all__ = ["Magnetometer"]
-
-
 Array = NDArray[np.float64]
 
 #: Field of the Earth at its surface, at least and at most, uT.

@@ -26,21 +26,6 @@ from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 from strapdown.tables.checks import MAG, is_number
 
-__all__ = [
-    "Epochs",
-    "ImuDerivedMeasurement",
-    "Measurement",
-    "TabulatedMeasurement",
-    "View",
-    "check_block",
-    "check_number",
-    "check_numbers",
-    "check_other_name",
-    "lasting",
-    "longer_by",
-]
-
-
 Array = NDArray[np.float64]
 
 

@@ -28,19 +28,6 @@ from strapdown.navigation.measurements.measurement import (
 from strapdown.navigation.measurements.vehicle import rate_columns
 from strapdown.rotation import cross_matrix
 
-__all__ = [
-    "STANDSTILL_DETECTORS",
-    "STANDSTILL_THRESHOLDS",
-    "StandstillAid",
-    "StandstillDetector",
-    "StandstillThreshold",
-    "Window",
-    "ZeroRate",
-    "ZeroVelocity",
-    "otsu",
-]
-
-
 Array = NDArray[np.float64]
 
 # A window of fewer samples has no meaningful variance.

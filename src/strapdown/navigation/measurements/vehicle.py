@@ -35,17 +35,6 @@ from strapdown.rotation import cross_matrix
 from strapdown.tables.aiding import BODY_VELOCITY, ODOMETER, check_body_velocity, check_odometer
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = [
-    "BodyVelocity",
-    "NoSlip",
-    "Odometer",
-    "VehicleAxes",
-    "point_velocity",
-    "rate_columns",
-    "turn_of_body",
-]
-
-
 Array = NDArray[np.float64]
 
 # Index of the rotation about the vertical among the physical errors.
