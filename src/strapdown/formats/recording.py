@@ -207,6 +207,8 @@ class RawLog:
     calibrated: str | None = None
     #: Triads of which some samples may be missing, NaN: of a magnetometer that began later.
     sparse: frozenset[str] = frozenset()
+    #: Table of fixes in a section of the same text, with names and a clock of its own.
+    fixes: RawLog | None = None
 
     @classmethod
     def of(
