@@ -27,7 +27,7 @@ from strapdown.formats.clocks import (
     spread_bursts,
     with_clock,
 )
-from strapdown.formats.columns import LONGEST, parse_axes, read_name
+from strapdown.formats.columns import LONGEST, OF_BROWSER, parse_axes, read_name
 from strapdown.formats.find_columns import (
     AXES,
     Column,
@@ -104,6 +104,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     if found["gyro_x"].source not in raw.stated:
         findings = [f for f in findings if f.code != "io.first-of-monitors"]
     log = LogInUse(raw, options, questions, found, findings)
+    _report_browser(log)
     values = log.values = values_of_triads(log)
     try:
         _take_out_codes(log)
@@ -121,6 +122,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     )
     if ticks is not None and ticks.size > 2 and raw.truth is None and step_range(ticks)[1] < 0:
         return assemble(raw.backward(), options, keep=keep)
+    if ticks is not None and raw.truth is None and (order := _even_order(ticks)) is not None:
+        return assemble(raw.in_order(order, "io.rows-out-of-order"), options, keep=keep)
     if ticks is not None and dated:
         _report_dates(log, found["time"].source)
     even = None
@@ -377,6 +380,34 @@ def _take_memory(log: LogInUse) -> None:
                 log.raw.columns[column.source] = values
 
 
+def _report_browser(log: LogInUse) -> None:
+    """Say which axes the rates of a browser are taken about: its documents name two orders."""
+    names = [log.found[q].source for q in GYRO]
+    if all(map(OF_BROWSER.fullmatch, names)):
+        alpha, beta, gamma = (reference(log.raw, name) for name in names)
+        other = f"gyro_x={beta},gyro_y={gamma},gyro_z={alpha}"
+        log.note("io.rates-of-browser", "gyro", names=names, columns=other)
+
+
+#: Largest difference of a step of rows put in order from the usual one, relative to it.
+EVEN = 0.5
+
+
+def _even_order(ticks: NDArray[Any]) -> NDArray[np.int64] | None:
+    """Return the order of rows that are out of order, if they then are those of one log.
+
+    Their stamps are distinct, and follow each other evenly; those of two logs one below the other
+    do not, nor those of a clock that was set.
+    """
+    if ticks.size < 4 or step_range(ticks)[0] >= 0 or not np.isfinite(ticks).all():
+        return None
+    order = np.argsort(ticks, kind="stable")
+    steps = np.diff(np.asarray(ticks)[order].astype(np.float64))
+    usual = float(np.median(steps))
+    even = usual > 0.0 and bool((np.abs(steps - usual) <= EVEN * usual).all())
+    return order if even else None
+
+
 def _written_twice(ticks: NDArray[Any], values: Mapping[str, Array]) -> bool:
     """Whether most rows that repeat the stamp before them repeat its values, too."""
     if ticks.dtype.kind not in "iuf":
@@ -569,7 +600,8 @@ def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
 
 #: A name that ends in that of a clock, behind the name of a sensor, and before a unit.
 _OWN_CLOCK = re.compile(
-    r"(?:^|.*[\s_.])(?:t|time|timestamp|stamp)(?:[\s_.\[(]*(s|sec|ms|us|ns)[\])]?)?(?: \(\d+\))?",
+    r"(?:^|.*[\s_.])(?:t|time|timestamp|stamp|X(?= ?\[s\]))(?:[\s_.\[(]*(s|sec|ms|us|ns)[\])]?)?"
+    r"(?: \(\d+\))?",
     re.I,
 )
 

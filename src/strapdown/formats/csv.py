@@ -46,7 +46,7 @@ from strapdown.formats.text_columns import (
     without_second_encoding,
 )
 from strapdown.formats.vocabularies import FIXES
-from strapdown.tables.on_disk import let_go
+from strapdown.tables.on_disk import let_go, step_range
 from strapdown.units import OF_LOGS, unit_of
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
@@ -135,6 +135,10 @@ def _at_once(
     # A line of text between rows makes text of every column.
     if columns is None or all(c.dtype.kind == "O" for c in columns):
         return None
+    # Fractions of a second without their zeros are told by their digits.
+    clock = _clock(top.names, columns)
+    if clock is not None and len(columns[clock]) > 1 and step_range(columns[clock])[0] < 0.0:
+        return None
     # Nor are blanks beside a separator part of a word.
     if any(c.dtype.kind == "O" for c in columns) and f"{top.separator} " in text:
         return None
@@ -158,7 +162,51 @@ def _line_by_line(
     if (several := _in_blocks(rows, top, name)) is not None:
         findings.append(several)
     columns = _parse(lines, len(top.names), top.separator, name)
+    clock = _clock(top.names, columns)
+    if clock is not None and len(columns[clock]) > 1 and step_range(columns[clock])[0] < 0.0:
+        texts = [fields_of(line, top.separator)[clock] for line in lines]
+        if (padded := _padded(texts)) is not None:
+            columns = [*columns[:clock], padded, *columns[clock + 1 :]]
+            finding = Finding(
+                "io.fractions-without-zeros",
+                severity="note",
+                file=name,
+                quantity=top.names[clock],
+                row=rows[0],
+            )
+            findings.append(finding)
     return _log(top, name, files, columns, np.array(rows), findings)
+
+
+def _clock(names: Sequence[str], columns: Columns) -> int | None:
+    """Return the number of the first column of fractional numbers that is named as a clock."""
+    floats = (k for k, c in enumerate(columns) if c.dtype.kind == "f")
+    return next((k for k in floats if read_name(names[k]).quantity == "time"), None)
+
+
+#: Seconds, a point, and a count of milli-, micro- or nanoseconds without zeros before it.
+_UNPADDED = re.compile(r"(\d+)\.(\d{1,9})")
+
+
+def _padded(texts: list[str]) -> NDArray[np.float64] | None:
+    """Return seconds of texts whose fraction is a number of thousandths, without its zeros.
+
+    ``0.98``, ``0.99``, ``0.100``. None where that does not put them in order, or any fraction has a
+    zero before it.
+    """
+    parts = [m.groups() for text in texts if (m := _UNPADDED.fullmatch(text.strip()))]
+    if len(parts) < len(texts) or any(f[0] == "0" and f != "0" for _, f in parts):
+        return None
+    digits = max(len(f) for _, f in parts)
+    digits = next(d for d in (3, 6, 9) if digits <= d)
+    seconds = np.array([int(s) + int(f) / 10**digits for s, f in parts])
+    steps = np.diff(seconds)
+    even = steps.max(initial=0.0) < PAUSE * float(np.median(steps)) if steps.size else False
+    return seconds if even and bool((steps > 0.0).all()) else None
+
+
+#: Longest step beside the usual one of rows whose fractions have no zeros.
+PAUSE = 20.0
 
 
 #: Fewest names of a section's columns, and most lines of text that are searched for them.

@@ -14,6 +14,7 @@ from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, ch
 from strapdown.formats.arrays import STEP_OF_FIXES, is_stamp, numbers, ticks_of
 from strapdown.formats.clocks import clock_of_name
 from strapdown.formats.columns import (
+    DELSYS_CLOCK,
     INDEXED,
     UNKNOWN_WORDS,
     ColumnName,
@@ -509,6 +510,11 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
             # Nor is a stamp that every row has, as a date beside a clock that starts at zero.
             held = {n: raw.columns[n] for n in names if n != "T"}
             names = [n for n, v in held.items() if not (v.size > FEW and (v == v[0]).all())]
+            if names and all(map(DELSYS_CLOCK.fullmatch, names)):
+                # Each column is behind its own: that of the gyro counts.
+                before = list(raw.columns)
+                before = before[: before.index(found.get("gyro_x", names[-1])) + 1]
+                names = [next(n for n in reversed(before) if n in names)]
             names = _one_clock(raw, names) if names else []
         if not names:
             continue

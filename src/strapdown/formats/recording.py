@@ -246,14 +246,18 @@ class RawLog:
     def backward(self) -> RawLog:
         """Return the log with its rows in the opposite order, and a note that they were so."""
         count = len(next(iter(self.columns.values())))
-        rows = np.arange(1, count + 1) if self.rows is None else self.rows
+        return self.in_order(np.arange(count)[::-1], "io.rows-in-descending-order")
+
+    def in_order(self, order: NDArray[np.int64], code: str) -> RawLog:
+        """Return the log with its rows in another order, and a note of this code."""
+        rows = np.arange(1, order.size + 1) if self.rows is None else self.rows
         out = dataclasses.replace(
             self,
-            columns={name: values[::-1].copy() for name, values in self.columns.items()},
-            rows=rows[::-1],
+            columns={name: values[order] for name, values in self.columns.items()},
+            rows=rows[order],
             findings=list(self.findings),
         )
-        out.note("io.rows-in-descending-order", "time", count=count)
+        out.note(code, "time", count=order.size)
         return out
 
     def row(self, sample: int) -> int:

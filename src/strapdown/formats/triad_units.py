@@ -547,7 +547,7 @@ def body_axes(log: LogInUse) -> Axes:
 _COUNTS = {"gyro": "io.example-gyro-counts", "accel": "io.example-accel-counts"}
 _LIKELY_COUNTS = {"gyro": "io.likely-gyro-counts", "accel": "io.likely-accel-counts"}
 # Values shown for a unit that the numbers leave open.
-_CHOICES = {"gyro": ("rad/s", "deg/s"), "accel": ("m/s2", "g"), "mag": ("uT", "gauss")}
+_CHOICES = {"gyro": ("rad/s", "deg/s"), "accel": ("m/s2", "g", "mg"), "mag": ("uT", "gauss")}
 
 
 def _inferred_unit(log: LogInUse, triad: str) -> tuple[str, str]:
