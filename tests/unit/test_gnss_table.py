@@ -157,6 +157,44 @@ def test_another_direction_or_unit_is_told_of_a_walk_and_of_a_drive(change, code
         assert data.items() <= refused.value.finding.data.items()
 
 
+def flown(seed, alt_unit=1.0, down_unit=1.0, white=2.0):
+    """Six minutes of a flight that climbs and descends, its heights with the scatter of code."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(360.0)
+    up = 2.5 * np.sin(t / 23.0) + np.where((t > 60) & (t < 120), 2.0, 0.0)
+    way = np.column_stack([20.0 * t, 0.0 * t, -np.r_[0.0, np.cumsum(0.5 * (up[1:] + up[:-1]))]])
+    place = geodetic_from_ned(way, (48.1, 11.5, 500.0))
+    place[:, 2] = (place[:, 2] + white * rng.normal(size=t.size)) / alt_unit
+    v = np.column_stack([20.0 + 0.0 * t, 0.0 * t, -up + 0.2 * rng.normal(size=t.size)])
+    v[:, 2] /= down_unit
+    # As is assumed of fixes that state none: too much for a step of the heights to be clear.
+    return tables.gnss_table(t, place, v, (30.0,) * 3, (0.3,) * 3)
+
+
+@pytest.mark.parametrize(
+    ("alt", "down", "stated"),
+    [
+        (0.3048, 1.0, "alt=ft"),
+        (1.0, -1.0, "VD=-m/s"),
+        (0.3048, -1.0, "alt=ft,VD=-m/s"),
+        (0.3048, 0.3048 / 60.0, "alt=ft,VD=ft/min"),
+        (1.0, -0.3048 / 60.0, "VD=-ft/min"),
+        (1.0, 1.0 / 3.6, "VD=km/h"),
+    ],
+)
+def test_heights_and_climbs_of_another_unit_are_told_by_each_other(alt, down, stated):
+    for seed in range(5):
+        flags = f"--gnss-units {stated}"
+        with pytest.raises(DataError, check=coded("tables.heights-unlike-climb", flags=flags)):
+            flown(seed, alt, down)
+
+
+def test_right_heights_are_not_refused():
+    for seed in range(40):
+        flown(seed)
+        flown(seed, white=20.0)
+
+
 def test_velocities_of_nothing_are_called_unlike():
     """As in body axes: forward, and nothing to the right."""
     t, place, v, sd, v_sd = drawn(3, 15.0, 0.3, 1.0)

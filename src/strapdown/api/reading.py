@@ -243,7 +243,7 @@ def read_imu(
         A format of `strapdown modules`; by default found by the content.
     columns : mapping of str to str, optional
         Quantity (``time``, ``gyro_x`` …, or ``gyro``, ``accel`` for three) to the name of its
-        column, or its number counted from 1.
+        column, or its number counted from 1; with a minus before it if it counts the other way.
     units : mapping of str to str, optional
         Of ``gyro`` (``deg/s``), ``accel`` (``g``) and ``time`` (``ms``), if not stated in the
         file.
@@ -346,8 +346,9 @@ def read_gnss(
     format : str, optional
         A format of `strapdown modules`; by default found by the content.
     columns : mapping of str to str, optional
-        Quantity (``time``, ``lat`` …) to the name of its column, or its number counted from 1.
-        Beside geodetic positions: ``ecef_x ecef_y ecef_z``, and local ``north east up``.
+        Quantity (``time``, ``lat`` …) to the name of its column, or its number counted from 1; with
+        a minus before it if it counts the other way. Beside geodetic positions:
+        ``ecef_x ecef_y ecef_z``, and local ``north east up``.
     units : mapping of str to str, optional
         Quantity to the unit of its column, if not stated in the file: ``{"time": "ms"}``.
     datum_height_m : float, optional

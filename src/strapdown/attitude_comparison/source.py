@@ -91,11 +91,15 @@ def read_source(spec: AttitudeSpec) -> AttitudeSource:
         turned = [f for f in log.findings if f.code == "attitude.axes-by-gravity"]
         axes = str(turned[0].data["axes"]) if turned else asked.axes
         findings = (*(f for f in log.findings if f not in turned), *turned)
+        imu = log.imu
+        if any(f.code == "io.no-gravity" for f in findings):
+            # Nothing levels by acceleration without gravity: the log is one of a gyro.
+            imu = imu.drop(columns=ACCEL)
         return AttitudeSource(
             log.name,
             "recorded log",
             log.origin,
-            log.imu,
+            imu,
             log.truth,
             log.scored,
             log.readings,

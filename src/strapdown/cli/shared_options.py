@@ -82,7 +82,8 @@ class LogFlags:
         list[str] | None,
         reading(
             "Q=NAME",
-            "time=t,gyro_x=wx,… ; a number counts columns from 1; gyro=NAME for an array of three.",
+            "time=t,gyro_x=wx,… ; a number counts columns from 1; -NAME reverses one; gyro=NAME "
+            "for an array of three.",
         ),
     ] = None
     gyro_unit: Annotated[

@@ -240,6 +240,9 @@ def run_case(
     records, spec = whole_records(spec)
     findings = [f for record in records.values() for f in record.findings]
     units = tuple(case_unit(unit, records) for unit in spec.units)
+    triads = [t for u in units for t in (*u.accelerometers, u.gyro) if t is not None]
+    read = [f for triad in triads for f in triad.table.attrs.get("findings", ())]
+    findings += [f for f in read if f.severity == "warning"]
     tables = {r.path: _reference_table(r) for r in spec.references if r.path is not None}
     entry = _entry(spec)
     inputs = _inputs(spec, case_file, records)

@@ -31,6 +31,17 @@ def occupied_grid(time: Array, end: float, step: float, reach: float) -> Array:
     return np.asarray(grid[(grid >= time[0]) & (grid < end)])
 
 
+def noise_free(values: Array) -> bool:
+    """Whether channels, (n, k), are of a simulation without noise.
+
+    Of white noise the fourth differences exceed the second 3.4 times, of a smooth motion they are
+    far below.
+    """
+    second = np.diff(values, n=2, axis=0)
+    fourth = np.diff(second, n=2, axis=0)
+    return bool((np.square(fourth).mean(axis=0) <= np.square(second).mean(axis=0)).all())
+
+
 def as_channels(values: ArrayLike, quantity: str = "values") -> Array:
     """Convert samples to floats of shape (n, k), all finite.
 

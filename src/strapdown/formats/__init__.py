@@ -348,6 +348,8 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
                     raw.files = tuple(dict.fromkeys((*reader.files(path), *own))) or raw.files
                 if isinstance(raw, RawLog) and key == TABLE and stream == "imu":
                     raw = of_one_sensor(raw)
+                if isinstance(raw, RawLog) and stream == "gnss" and raw.fixes is not None:
+                    raw = raw.fixes  # a section of its own
                 return raw
             except _BROKEN as error:
                 _log.debug("%s", path.name, exc_info=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.dsp.samples import noise_free
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.arrays import as_rows, epoch_of, numbers, open_dates, ticks_of
 from strapdown.formats.clocks import (
@@ -26,7 +27,7 @@ from strapdown.formats.clocks import (
     spread_bursts,
     with_clock,
 )
-from strapdown.formats.columns import LONGEST, parse_axes, read_name
+from strapdown.formats.columns import LONGEST, OF_BROWSER, parse_axes, read_name
 from strapdown.formats.find_columns import (
     AXES,
     Column,
@@ -36,6 +37,7 @@ from strapdown.formats.find_columns import (
     reference,
     steady_triads,
     unit_stated,
+    with_reversed,
     without_gyro,
 )
 from strapdown.formats.inference.conclusion import infer_accel, infer_time_unit
@@ -82,7 +84,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     ConfigError: an option names a column that does not exist.
     """
     questions = Questions(raw.name)
-    raw = _with_force_of_parts(raw, options)
+    raw, options = with_reversed(_with_force_of_parts(raw, options), options)
     found = find_columns(raw, options, questions)
     if missing := [q for q in GYRO if q not in found]:
         raise without_gyro(raw, missing)
@@ -102,6 +104,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     if found["gyro_x"].source not in raw.stated:
         findings = [f for f in findings if f.code != "io.first-of-monitors"]
     log = LogInUse(raw, options, questions, found, findings)
+    _report_browser(log)
     values = log.values = values_of_triads(log)
     try:
         _take_out_codes(log)
@@ -119,6 +122,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     )
     if ticks is not None and ticks.size > 2 and raw.truth is None and step_range(ticks)[1] < 0:
         return assemble(raw.backward(), options, keep=keep)
+    if ticks is not None and raw.truth is None and (order := _even_order(ticks)) is not None:
+        return assemble(raw.in_order(order, "io.rows-out-of-order"), options, keep=keep)
     if ticks is not None and dated:
         _report_dates(log, found["time"].source)
     even = None
@@ -223,6 +228,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     sampling = sampling_of(log, units)
     _report_gaps(log, time, body["gyro"])
     _report_beyond_limits(log, body, kept)
+    _report_constant(log, body, axes.axis)
     let_go(block)
     _report_weightless(log, body.get("accel"))
     columns = [f"{triad}_{a}" for triad in units for a in AXES]
@@ -372,6 +378,34 @@ def _take_memory(log: LogInUse) -> None:
         for column, values in zip(log.columns(triad), block.T, strict=True):
             if log.raw.columns[column.source].dtype == values.dtype:
                 log.raw.columns[column.source] = values
+
+
+def _report_browser(log: LogInUse) -> None:
+    """Say which axes the rates of a browser are taken about: its documents name two orders."""
+    names = [log.found[q].source for q in GYRO]
+    if all(map(OF_BROWSER.fullmatch, names)):
+        alpha, beta, gamma = (reference(log.raw, name) for name in names)
+        other = f"gyro_x={beta},gyro_y={gamma},gyro_z={alpha}"
+        log.note("io.rates-of-browser", "gyro", names=names, columns=other)
+
+
+#: Largest difference of a step of rows put in order from the usual one, relative to it.
+EVEN = 0.5
+
+
+def _even_order(ticks: NDArray[Any]) -> NDArray[np.int64] | None:
+    """Return the order of rows that are out of order, if they then are those of one log.
+
+    Their stamps are distinct, and follow each other evenly; those of two logs one below the other
+    do not, nor those of a clock that was set.
+    """
+    if ticks.size < 4 or step_range(ticks)[0] >= 0 or not np.isfinite(ticks).all():
+        return None
+    order = np.argsort(ticks, kind="stable")
+    steps = np.diff(np.asarray(ticks)[order].astype(np.float64))
+    usual = float(np.median(steps))
+    even = usual > 0.0 and bool((np.abs(steps - usual) <= EVEN * usual).all())
+    return order if even else None
 
 
 def _written_twice(ticks: NDArray[Any], values: Mapping[str, Array]) -> bool:
@@ -566,7 +600,8 @@ def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
 
 #: A name that ends in that of a clock, behind the name of a sensor, and before a unit.
 _OWN_CLOCK = re.compile(
-    r"(?:^|.*[\s_.])(?:t|time|timestamp|stamp)(?:[\s_.\[(]*(s|sec|ms|us|ns)[\])]?)?(?: \(\d+\))?",
+    r"(?:^|.*[\s_.])(?:t|time|timestamp|stamp|X(?= ?\[s\]))(?:[\s_.\[(]*(s|sec|ms|us|ns)[\])]?)?"
+    r"(?: \(\d+\))?",
     re.I,
 )
 
@@ -855,6 +890,30 @@ def _report_beyond_limits(
 WEIGHTLESS = 0.3 * STANDARD_GRAVITY  # m/s²
 #: Rows, spread evenly over a log, of which this is judged.
 SOME = 100_000
+
+
+def _report_constant(log: LogInUse, body: Mapping[str, Array], axis: Sequence[int]) -> None:
+    """Warn of a channel that never changes beside others that have the noise of a sensor.
+
+    `axis`: of the sensor, for each of the body.
+    """
+    for triad in ("gyro", "accel"):
+        if triad not in body:
+            continue
+        channels = body[triad].T
+        constant = [bool((c[:SOME] == c[0]).all() and (c == c[0]).all()) for c in channels]
+        if not any(constant) or all(constant):
+            continue
+        if noise_free(np.column_stack([c[:SOME] for c in channels])):
+            continue
+        for k in np.flatnonzero(constant):
+            log.warn(
+                "io.channel-constant",
+                f"{triad}_{AXES[k]}",
+                name=log.found[f"{triad}_{AXES[axis[k]]}"].source,
+                value=float(channels[k][0]) + 0.0,
+                count=len(channels[k]),
+            )
 
 
 def _report_weightless(log: LogInUse, accel: Array | None) -> None:

@@ -75,6 +75,14 @@ _HEMISPHERE = re.compile(
 )
 # Clocks of X-Plane's data output: of the simulated world and of all.
 _XPLANE = ("_totl,_time",)
+# Delsys: NAME: GYRO.X 1 (IM) [°/s], each behind its clock, X[s]; a browser: rotationRate.alpha.
+_DELSYS = re.compile(
+    r"(?P<of>.*):\s*(?P<triad>ACC|GYRO|MAG)[. ]?(?P<axis>[XYZ])(?P<rest>\s*\d*(?:\s*\([^()]*\))?)"
+    r"\s*(?:\[(?P<unit>[^\[\]]+)\])?"
+)
+DELSYS_CLOCK = re.compile(r"X ?\[s\](?: \(\d+\))?")
+#: Rates of turn of a browser's event: about x, y, z as Chromium and WebKit write them.
+OF_BROWSER = re.compile(r"(.*rotation[_ ]?rate)[._ ]?(alpha|beta|gamma)", re.I)
 # Words and numbers of a heading, whose capitals may begin words.
 _WORD = re.compile(r"[^\W\d_]+|\d+")
 
@@ -181,8 +189,15 @@ def _of_format(text: str, index: str) -> ColumnName | None:
     if index and text in PX4 and int(index) < len(_AXES):
         triad, unit = PX4[text]
         return ColumnName(f"{triad}_{_AXES[int(index)]}", unit, family=text)
-    if text.lower() in _XPLANE:
+    if text.lower() in _XPLANE or DELSYS_CLOCK.fullmatch(text):
         return ColumnName("time", "s")
+    if len(text) <= LONGEST and (match := _DELSYS.fullmatch(text)):
+        triad = {"ACC": "accel", "GYRO": "gyro", "MAG": "mag"}[match["triad"]]
+        unit = unit_of(match["unit"] or "")
+        return ColumnName(f"{triad}_{match['axis'].lower()}", unit, family=match["of"])
+    if len(text) <= LONGEST and (match := OF_BROWSER.fullmatch(text)):
+        axis = {"alpha": "x", "beta": "y", "gamma": "z"}[match[2].lower()]
+        return ColumnName(f"gyro_{axis}", "deg/s", family=match[1].lower())
     if not text.startswith("field."):
         return None
     if text == "field.header.stamp":

@@ -11,7 +11,7 @@ import dataclasses
 import itertools
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal
@@ -46,7 +46,7 @@ from strapdown.formats.text_columns import (
     without_second_encoding,
 )
 from strapdown.formats.vocabularies import FIXES
-from strapdown.tables.on_disk import let_go
+from strapdown.tables.on_disk import let_go, step_range
 from strapdown.units import OF_LOGS, unit_of
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
@@ -135,6 +135,10 @@ def _at_once(
     # A line of text between rows makes text of every column.
     if columns is None or all(c.dtype.kind == "O" for c in columns):
         return None
+    # Fractions of a second without their zeros are told by their digits.
+    clock = _clock(top.names, columns)
+    if clock is not None and len(columns[clock]) > 1 and step_range(columns[clock])[0] < 0.0:
+        return None
     # Nor are blanks beside a separator part of a word.
     if any(c.dtype.kind == "O" for c in columns) and f"{top.separator} " in text:
         return None
@@ -158,7 +162,51 @@ def _line_by_line(
     if (several := _in_blocks(rows, top, name)) is not None:
         findings.append(several)
     columns = _parse(lines, len(top.names), top.separator, name)
+    clock = _clock(top.names, columns)
+    if clock is not None and len(columns[clock]) > 1 and step_range(columns[clock])[0] < 0.0:
+        texts = [fields_of(line, top.separator)[clock] for line in lines]
+        if (padded := _padded(texts)) is not None:
+            columns = [*columns[:clock], padded, *columns[clock + 1 :]]
+            finding = Finding(
+                "io.fractions-without-zeros",
+                severity="note",
+                file=name,
+                quantity=top.names[clock],
+                row=rows[0],
+            )
+            findings.append(finding)
     return _log(top, name, files, columns, np.array(rows), findings)
+
+
+def _clock(names: Sequence[str], columns: Columns) -> int | None:
+    """Return the number of the first column of fractional numbers that is named as a clock."""
+    floats = (k for k, c in enumerate(columns) if c.dtype.kind == "f")
+    return next((k for k in floats if read_name(names[k]).quantity == "time"), None)
+
+
+#: Seconds, a point, and a count of milli-, micro- or nanoseconds without zeros before it.
+_UNPADDED = re.compile(r"(\d+)\.(\d{1,9})")
+
+
+def _padded(texts: list[str]) -> NDArray[np.float64] | None:
+    """Return seconds of texts whose fraction is a number of thousandths, without its zeros.
+
+    ``0.98``, ``0.99``, ``0.100``. None where that does not put them in order, or any fraction has a
+    zero before it.
+    """
+    parts = [m.groups() for text in texts if (m := _UNPADDED.fullmatch(text.strip()))]
+    if len(parts) < len(texts) or any(f[0] == "0" and f != "0" for _, f in parts):
+        return None
+    digits = max(len(f) for _, f in parts)
+    digits = next(d for d in (3, 6, 9) if digits <= d)
+    seconds = np.array([int(s) + int(f) / 10**digits for s, f in parts])
+    steps = np.diff(seconds)
+    even = steps.max(initial=0.0) < PAUSE * float(np.median(steps)) if steps.size else False
+    return seconds if even and bool((steps > 0.0).all()) else None
+
+
+#: Longest step beside the usual one of rows whose fractions have no zeros.
+PAUSE = 20.0
 
 
 #: Fewest names of a section's columns, and most lines of text that are searched for them.
@@ -182,7 +230,7 @@ def _sections(numbered: Lines) -> list[tuple[str, Lines]]:
             if (
                 {"_x", "_y", "_z"} <= axes
                 or set("xyz") <= {n.lower()[:1] for n in names}
-                or {"lat", "lon"} <= {read_name(n, FIXES).quantity for n in names}
+                or _are_fixes(names)
             ):
                 heads.append((k, names))
     if len({tuple(names) for _, names in heads}) < 2:
@@ -221,6 +269,7 @@ def _joined(
     from strapdown.formats.join import join
 
     logs: list[RawLog] = []
+    fixes: RawLog | None = None
     for title, numbered in parts:
         top = TableTop(numbered, comments, kinds)
         if title and not any("_" in str(read_name(n).quantity) for n in top.names):
@@ -230,7 +279,11 @@ def _joined(
             top.names = [axes.get(n, n) for n in top.names]
         rows, lines = _whole_lines(top, True, name, findings)
         columns = _parse(lines, len(top.names), top.separator, name)
-        logs.append(_log(top, name, files, columns, np.array(rows), []))
+        log = _log(top, name, files, columns, np.array(rows), [])
+        if fixes is None and not any(map(_is_gyro, log.columns)) and _are_fixes(log.columns):
+            fixes = log
+        else:
+            logs.append(log)
     if not any(_is_gyro(n) for log in logs for n in log.columns):
         raise DataError(
             "io.csv-sections",
@@ -238,12 +291,18 @@ def _joined(
             row=parts[1][1][0][0],
             sections=[", ".join(log.columns) for log in logs],
         )
-    add_note(findings, "io.csv-sections-joined", file=name, count=len(logs))
-    raw = join(
-        [dataclasses.replace(log, name=f"{name}/{k}") for k, log in enumerate(logs, 1)], name, files
-    )
+    if len(logs) == 1:
+        raw = logs[0]
+    else:
+        add_note(findings, "io.csv-sections-joined", file=name, count=len(logs))
+        named = [dataclasses.replace(log, name=f"{name}/{k}") for k, log in enumerate(logs, 1)]
+        raw = join(named, name, files)
     raw.findings[:0] = findings
-    return raw
+    return dataclasses.replace(raw, fixes=fixes)
+
+
+def _are_fixes(names: Iterable[str]) -> bool:
+    return {"lat", "lon"} <= {read_name(n, FIXES).quantity for n in names}
 
 
 def _whole_lines(
@@ -341,13 +400,19 @@ def _refuse_kinds(numbered: Lines, separator: str | None, name: str) -> None:
             return
     repeated = len(numbered) >= 3 * len(widths)  # stamps are not
     if repeated and len(widths) > 1 and all(len(counts) == 1 for counts in widths.values()):
-        raise DataError(
-            "io.csv-rows-of-kinds",
-            file=name,
-            kinds=[
-                f"{kind!r} ({rows[kind]} rows of {min(widths[kind])} fields)" for kind in widths
-            ],
-        )
+        raise _of_kinds(name, rows, {kind: min(counts) for kind, counts in widths.items()})
+
+
+def _of_kinds(name: str, rows: Mapping[str, int], widths: Mapping[str, int]) -> DataError:
+    kinds = [f"{kind!r} ({rows[kind]} rows of {widths[kind]} fields)" for kind in widths]
+    return DataError("io.csv-rows-of-kinds", file=name, kinds=kinds)
+
+
+def _refuse_alike(rows: Counter[str], width: int, name: str) -> None:
+    """Refuse rows without names whose first field is one of some words: each is of a kind."""
+    words = all(word[:1].isalpha() for word in rows)
+    if words and 1 < len(rows) <= KINDS and min(rows.values()) >= 3:
+        raise _of_kinds(name, rows, dict.fromkeys(rows, width))
 
 
 def _count(line: str, separator: str | None) -> int:
@@ -434,6 +499,8 @@ def _log(
             top.names = list(short.values())
             top.units = {short[name]: unit for name, unit in top.units.items()}
     held = dict(zip(top.names, columns, strict=True))
+    if top.names[0] == "column 1" and columns[0].dtype.kind == "O":
+        _refuse_alike(Counter(columns[0].astype(str).tolist()), len(columns), name)
     said = [line[:LONGEST] for line in top.above]
     held = _vectors_apart(_without_units(held, top.units))
     held = with_one_clock(held, top.units, findings, name)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, ch
 from strapdown.formats.arrays import STEP_OF_FIXES, is_stamp, numbers, ticks_of
 from strapdown.formats.clocks import clock_of_name
 from strapdown.formats.columns import (
+    DELSYS_CLOCK,
     INDEXED,
     UNKNOWN_WORDS,
     ColumnName,
@@ -145,6 +146,40 @@ def _ask_parts(raw: RawLog, found: Mapping[str, Column], questions: Questions) -
             names=names,
         )
         questions.ask(fault, **columns)
+
+
+def with_reversed(raw: RawLog, options: ReadOptions) -> tuple[RawLog, ReadOptions]:
+    """Return a log with the columns that the user names with a minus reversed, and named so.
+
+    ``gyro_z=-gz`` names the column ``gz``, whose numbers count the other way: it becomes ``-gz``.
+    A file may have a column of that name already. ConfigError: as of `find_columns`.
+    """
+    columns = dict(options.columns)
+    reversed_ = {}
+    for quantity, source in options.columns.items():
+        triad = quantity.partition("_")[0]
+        if not source.startswith("-") or source in raw.columns or triad not in TRIADS:
+            continue
+        if quantity in TRIADS and _three_of(raw, quantity, source):
+            continue
+        plain = source.removeprefix("-")
+        names = [name for _, name in _asked(raw, quantity, plain)]
+        reversed_ |= {name: f"-{name}" for name in names}
+        if quantity not in TRIADS:
+            columns[quantity] = f"-{names[0]}"
+    if not reversed_:
+        return raw, options
+    held = {
+        reversed_.get(name, name): -np.asarray(numbers(raw, name, name), dtype=np.float64)
+        if name in reversed_
+        else values
+        for name, values in raw.columns.items()
+    }
+    units = {reversed_.get(name, name): unit for name, unit in raw.units.items()}
+    stated = {reversed_.get(name, name): one for name, one in raw.stated.items()}
+    others = [{reversed_.get(n, n): q for n, q in unit.items()} for unit in raw.other_units]
+    raw = replace(raw, columns=held, units=units, stated=stated, other_units=others)
+    return raw, replace(options, columns=columns)
 
 
 def names_of_quantities(raw: RawLog) -> set[str]:
@@ -475,6 +510,11 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
             # Nor is a stamp that every row has, as a date beside a clock that starts at zero.
             held = {n: raw.columns[n] for n in names if n != "T"}
             names = [n for n, v in held.items() if not (v.size > FEW and (v == v[0]).all())]
+            if names and all(map(DELSYS_CLOCK.fullmatch, names)):
+                # Each column is behind its own: that of the gyro counts.
+                before = list(raw.columns)
+                before = before[: before.index(found.get("gyro_x", names[-1])) + 1]
+                names = [next(n for n in reversed(before) if n in names)]
             names = _one_clock(raw, names) if names else []
         if not names:
             continue
@@ -824,6 +864,7 @@ def find_quantities(
     """
     columns, known = list(names), of.quantities
     wanted: dict[str, str] = {}
+    signs: dict[str, float] = {}
     for quantity, name in asked.items():
         if quantity not in known:
             raise ConfigError(
@@ -834,12 +875,16 @@ def find_quantities(
                 word=quantity,
                 known=known,
             )
+        # A column that counts the other way, of a quantity with a sign.
+        minus = name.startswith("-") and name not in columns and bool(known[quantity].units)
+        name = name.removeprefix("-") if minus and quantity != "time" else name
         if name not in columns and name.isdecimal() and 1 <= int(name) <= len(columns):
             name = columns[int(name) - 1]
         check_choice(
             "io.no-column-3", columns, quantity=f"columns {quantity}", file=file, name=name
         )
         wanted[name] = quantity
+        signs |= {name: -1.0} if minus else {}
     found: dict[str, Found] = {}
     read = {name: read_name(name, of, (units or {}).get(name, "")) for name in columns}
     for evidence in range(3):
@@ -855,7 +900,7 @@ def find_quantities(
                 continue
             if meant in found and name.startswith(f"{found[meant].source} ("):
                 continue  # the same name once more (`csv`): the first counts
-            sign = said.sign if said.quantity == meant else 1.0
+            sign = signs.get(name, said.sign if said.quantity == meant else 1.0)
             factor = sign * _factor(meant, known[meant], said.unit, name, file)
             if meant in found and _in_other_unit(found[meant].source, name):
                 continue

@@ -131,7 +131,6 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     not stated, or as `gnss_table`.
     """
     count = fixes.time.size
-    place = _over_ellipsoid(fixes, options)
     asked, taken = options.position_sd, {}
     if fixes.position_sd is None and asked is None and options.unstated_position_sd is not None:
         asked = taken["position_sd_taken"] = options.unstated_position_sd
@@ -142,6 +141,20 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
                 file=fixes.name,
                 quantity=", ".join(POSITION_SD),
             )
+    try:
+        place = _over_ellipsoid(fixes, options)
+    except DataError as error:
+        if fixes.position_sd is not None or asked is not None:
+            raise
+        # What a file leaves open is asked at once.
+        questions = [error.finding, _without_sd(fixes)]
+        raise DataError(
+            "io.fixes-leave-open",
+            file=fixes.name,
+            questions=questions,
+            flags=error.finding.data.get("flags", ""),
+            keys=error.finding.data.get("keys", ""),
+        ) from None
     position_sd = _sd(fixes, "position", asked, count)
     if fixes.heights_from == NOWHERE:
         position_sd[:, 2] = _sd_of_stated_height(fixes, asked, options, count)
@@ -346,6 +359,11 @@ def _velocity(fixes: Fixes, asked: Sd | None, count: int) -> tuple[Array, Array]
     return np.where(there, fixes.velocity, 0.0), np.where(there, sd, np.inf)
 
 
+def _without_sd(fixes: Fixes) -> Finding:
+    names = ", ".join(POSITION_SD)
+    return Finding("io.position-sd-not-stated", severity="error", file=fixes.name, quantity=names)
+
+
 def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
     names = POSITION_SD if what == "position" else VELOCITY_SD
     stated = fixes.position_sd if what == "position" else fixes.velocity_sd
@@ -360,7 +378,7 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
                 quantity=", ".join(VELOCITY),
             )
             return np.full((count, 3), np.inf)
-        raise DataError("io.position-sd-not-stated", file=fixes.name, quantity=", ".join(names))
+        raise DataError(_without_sd(fixes))
     sd = np.where(np.isnan(stated), np.inf, stated)
     zero = sd == 0.0
     if fixes.zero_is_unknown and zero.any():

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.arrays import numbers, ticks_of
-from strapdown.formats.find_columns import Column, find_columns
+from strapdown.formats.find_columns import Column, find_columns, with_reversed
 from strapdown.formats.inference.conclusion import infer_time_unit
 from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.formats.vocabularies import QUANTITIES
@@ -301,9 +301,10 @@ def with_columns(logs: Sequence[RawLog], options: ReadOptions) -> list[RawLog]:
     asked: list[dict[str, str]] = [{} for _ in logs]
     for quantity, source in options.columns.items():
         for log, its in zip(logs, asked, strict=True):
-            plain = source.removeprefix(f"{_short(log)}/")
+            sign = "-" if source.startswith("-") and source not in log.columns else ""
+            plain = source.removeprefix(sign).removeprefix(f"{_short(log)}/")
             if plain in log.columns:
-                its[quantity] = plain
+                its[quantity] = f"{sign}{plain}"
         if not any(quantity in its for its in asked):
             raise ConfigError(
                 "io.no-log-with-column",
@@ -314,7 +315,8 @@ def with_columns(logs: Sequence[RawLog], options: ReadOptions) -> list[RawLog]:
             )
     out = []
     for log, its in zip(logs, asked, strict=True):
-        found = find_columns(log, dataclasses.replace(options, columns=its))
+        log, own = with_reversed(log, dataclasses.replace(options, columns=its))
+        found = find_columns(log, own)
         stated = {c.source: (q, c.unit) for q, c in found.items()}
         out.append(dataclasses.replace(log, stated=stated) if its else log)
     return out

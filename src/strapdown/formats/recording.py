@@ -90,7 +90,8 @@ class ReadOptions:
     ----------
     columns : dict of str to str
         Quantity (``time``, ``gyro_x`` …, or ``gyro``, ``accel`` for a group of three) to the
-        name of the column in the file, or its number, from 1.
+        name of the column in the file, or its number, from 1; with a minus before it if it
+        counts the other way.
     gyro_unit, accel_unit, time_unit : str, optional
         Keys of `units.GYRO_UNITS`, `ACCEL_UNITS`, `TIME_UNITS`; or of `GYRO_SUMS`,
         `ACCEL_SUMS` for increments per sample.
@@ -209,6 +210,8 @@ class RawLog:
     calibrated: str | None = None
     #: Triads of which some samples may be missing, NaN: of a magnetometer that began later.
     sparse: frozenset[str] = frozenset()
+    #: Table of fixes in a section of the same text, with names and a clock of its own.
+    fixes: RawLog | None = None
 
     @classmethod
     def of(
@@ -246,14 +249,18 @@ class RawLog:
     def backward(self) -> RawLog:
         """Return the log with its rows in the opposite order, and a note that they were so."""
         count = len(next(iter(self.columns.values())))
-        rows = np.arange(1, count + 1) if self.rows is None else self.rows
+        return self.in_order(np.arange(count)[::-1], "io.rows-in-descending-order")
+
+    def in_order(self, order: NDArray[np.int64], code: str) -> RawLog:
+        """Return the log with its rows in another order, and a note of this code."""
+        rows = np.arange(1, order.size + 1) if self.rows is None else self.rows
         out = dataclasses.replace(
             self,
-            columns={name: values[::-1].copy() for name, values in self.columns.items()},
-            rows=rows[::-1],
+            columns={name: values[order] for name, values in self.columns.items()},
+            rows=rows[order],
             findings=list(self.findings),
         )
-        out.note("io.rows-in-descending-order", "time", count=count)
+        out.note(code, "time", count=order.size)
         return out
 
     def row(self, sample: int) -> int:

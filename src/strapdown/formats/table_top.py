@@ -272,6 +272,8 @@ _IN = re.compile(
 _COUNT = r"(?:LSBs?|counts?|digits?)"
 _PER_UNIT = re.compile(rf"({UNSIGNED})\s*{_COUNT}\s*(?:/|per)\s*\(?([^\s,;)]+)", re.I)
 _PER_COUNT = re.compile(rf"({UNSIGNED})\s*([^\s\d,;(]+?)\s*(?:/|per)\s*{_COUNT}", re.I)
+# Counts of 1 g among the settings of a flight controller: acc_1G:2048.
+_ONE_G = re.compile(rf"[_ ]?1_?G\"?[\s:=,]+\"?({UNSIGNED})", re.I)
 _RANGE = re.compile(r"(?:±|\+/?-|_FS[_=]?)\s*(\d+)\s*([^\s,;)]*)", re.I)
 _16_BIT = re.compile(r"\bint16|\b16[ -]?bit", re.I)
 _KNOWN = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "mag": MAG_UNITS}
@@ -289,8 +291,8 @@ def stated_rate(above: list[str]) -> float | None:
 def stated_units(above: list[str], columns: dict[str, NDArray[Any]]) -> dict[str, str]:
     """Return the unit of each sensor that lines above a table state.
 
-    ``gyro: deg/s``; counts by ``131 LSB/(deg/s)``, ``0.061 mg/LSB``, or by a range of 16 bits:
-    ``±250 deg/s … 16 bit``. Counts are whole numbers; a range says no unit of others.
+    ``gyro: deg/s``; counts by ``131 LSB/(deg/s)``, ``0.061 mg/LSB``, ``acc_1G:2048``, or by a range
+    of 16 bits: ``±250 deg/s … 16 bit``. Counts are whole numbers; a range says no unit of others.
     """
     text = "\n".join(above)
     out: dict[str, str] = {}
@@ -312,7 +314,9 @@ def stated_units(above: list[str], columns: dict[str, NDArray[Any]]) -> dict[str
 
 def _counts(triad: str, text: str, of_16_bits: bool) -> str | None:
     """Return the unit of raw counts that a text states."""
-    if m := _PER_UNIT.search(text):
+    if triad == "accel" and (m := _ONE_G.match(text)) and float(m[1]):
+        scale, unit = f"/{m[1]}", "g"
+    elif m := _PER_UNIT.search(text):
         scale, unit = f"/{m[1]}", unit_of(m[2])
     elif m := _PER_COUNT.search(text):
         return f"{m[1]} {of}" if (of := unit_of(m[2])) in _KNOWN[triad] else None

@@ -13,7 +13,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.arrays import as_rows, numbers
 from strapdown.formats.columns import parse_axes, read_name
-from strapdown.formats.find_columns import AXES, Column, stated_word
+from strapdown.formats.find_columns import AXES, Column, reference, stated_word
 from strapdown.formats.inference.conclusion import THRESHOLD, Inference
 from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
@@ -137,8 +137,11 @@ def units_of_triads(log: LogInUse) -> dict[str, tuple[str, str]]:
     """
     units: dict[str, tuple[str, str]] = {}
     asked: set[str] = set()
-    gyro_asked = False
+    gyro_asked = mixed = _axis_in_other_unit(log, stated=bool(log.options.gyro_unit))
     for triad in log.values:
+        if triad == "gyro" and mixed:
+            units[triad] = log.options.gyro_unit or "rad/s", "asked"
+            continue
         if triad == "accel" and _without_gravity(log):
             log.note("io.left-out-linear-acceleration", triad)
             continue
@@ -175,6 +178,9 @@ def units_of_triads(log: LogInUse) -> dict[str, tuple[str, str]]:
             units[triad] = "rad/s" if unit == "UNIT" else unit, "asked"
             gyro_asked = True
     plain = {t: u for t, (u, _) in units.items()}
+    if mixed:
+        return units
+    _report_noise_of_axes(log)
     _report_contradictions(log, plain, asked)
     _ask_beyond_full_scale(log, plain, asked)
     if not any(q.quantity == "gyro" for q in log.questions.questions):
@@ -201,6 +207,70 @@ def _cause(low: float, high: float) -> Finding:
     factor = next((f for f in _RANGES if low < f < high), None)
     code = "io.cause-unknown" if factor is None else "io.cause-range"
     return Finding(code, severity="note", factor=factor)
+
+
+def _axis_in_other_unit(log: LogInUse, *, stated: bool) -> bool:
+    """Ask about a gyro of which one axis is in another unit than the others, by turning gravity.
+
+    `stated`: whether the user states the unit of all three, so that it is a warning.
+    """
+    scale = log.said.get("gyro_scale")
+    said = scale.evidence[0] if scale is not None else None
+    if said is None or said.code != "io.evidence-axis-in-other-unit":
+        return False
+    column = log.found[f"gyro_{said.data['axis']}"]
+    fault = Finding(
+        "io.gyro-axis-in-other-unit",
+        severity="warning" if stated else "error",
+        file=log.raw.name,
+        quantity=f"gyro_{said.data['axis']}",
+        name=column.source,
+        unit=said.data["unit"],
+        others=said.data["others"],
+        reason=said,
+    )
+    if stated:
+        log.findings.append(fault)
+    else:
+        log.questions.ask(fault)
+    return True
+
+
+#: Samples of a piece whose noise is measured, the most pieces, and the fewest.
+_OF_NOISE, _PIECES, _FEWEST_PIECES = 50, 400, 8
+#: How far the noise of one axis may be from 57.3 times that of the others, or a 57.3th, and that of
+#: those from each other: gyros of one chip agree within 2, a vibrating car makes 9 of it.
+_NOISE_OF_UNIT, _NOISE_ALIKE = 2.0, 3.0
+
+
+def _report_noise_of_axes(log: LogInUse) -> None:
+    """Warn of a gyro whose one axis has the noise of another unit, where gravity does not turn."""
+    scale, gyro = log.said.get("gyro_scale"), log.values["gyro"]
+    count = len(gyro) // _OF_NOISE
+    if (scale is not None and scale.value is not None) or count < _FEWEST_PIECES:
+        return
+    pieces = gyro[: count * _OF_NOISE].reshape(count, _OF_NOISE, 3)[:: 1 + count // _PIECES]
+    steps = np.median(np.abs(np.diff(pieces.astype(np.float64), n=2, axis=1)), axis=1)
+    # The calmer pieces have the least of the motion.
+    steps = steps[np.isfinite(steps).all(axis=1)]
+    noise = np.quantile(steps, 0.25, axis=0) if len(steps) >= _FEWEST_PIECES else np.zeros(3)
+    if not (noise > 0.0).all():
+        return
+    for k in range(3):
+        others = np.delete(noise, k)
+        ratio = float(noise[k] / np.sqrt(others.prod()))
+        off = np.degrees(1.0) / max(ratio, 1.0 / ratio)
+        alike = others.max() < _NOISE_ALIKE * others.min()
+        if alike and 1.0 / _NOISE_OF_UNIT < off < _NOISE_OF_UNIT:
+            units = ("deg/s", "rad/s") if ratio > 1.0 else ("rad/s", "deg/s")
+            log.warn(
+                "io.gyro-axis-noise-of-other-unit",
+                f"gyro_{AXES[k]}",
+                name=log.found[f"gyro_{AXES[k]}"].source,
+                ratio=ratio,
+                unit=units[0],
+                others=units[1],
+            )
 
 
 def _report_scale_of_gyro(log: LogInUse, unit: str) -> None:
@@ -343,7 +413,7 @@ def _stated_unit(log: LogInUse, triad: str) -> tuple[str, str] | None:
     if all(read_name(c.source).increment for c in columns):
         known |= set(SUMS[triad])
     unit = columns[0].unit
-    if len(units) == 1 and unit is not None and unit in known:
+    if unit is not None and (units == {unit} or len(units) > 1) and units <= known:
         return unit, columns[0].why if columns[0].basis == "file" else "in its name"
     if units == {None} and triad in log.raw.triad_units:
         return parse_unit(log.raw.triad_units[triad], triad), "stated above the table"
@@ -381,8 +451,17 @@ def values_of_triads(log: LogInUse) -> dict[str, Array]:
 
 
 def _triad(log: LogInUse, triad: str) -> Array:
-    columns = zip(log.columns(triad), AXES, strict=True)
-    parts = [numbers(log.raw, column.source, f"{triad}_{a}") for column, a in columns]
+    columns = log.columns(triad)
+    parts = [
+        numbers(log.raw, column.source, f"{triad}_{a}")
+        for column, a in zip(columns, AXES, strict=True)
+    ]
+    stated, known = [str(c.unit) for c in columns], UNITS[triad]
+    by_user = getattr(log.options, f"{triad}_unit", None)
+    if len({*stated}) > 1 and known.keys() >= {*stated} and not by_user:
+        first = stated[0]
+        parts = [p * (known[u] / known[first]) for p, u in zip(parts, stated, strict=True)]
+        log.note("io.axes-in-units-of-their-own", triad, triad=triad, units=stated, unit=first)
     # Column by column, as it came and as the Imu table has it.
     rows = as_rows(parts)
     if rows is None:
@@ -474,7 +553,7 @@ def body_axes(log: LogInUse) -> Axes:
 _COUNTS = {"gyro": "io.example-gyro-counts", "accel": "io.example-accel-counts"}
 _LIKELY_COUNTS = {"gyro": "io.likely-gyro-counts", "accel": "io.likely-accel-counts"}
 # Values shown for a unit that the numbers leave open.
-_CHOICES = {"gyro": ("rad/s", "deg/s"), "accel": ("m/s2", "g"), "mag": ("uT", "gauss")}
+_CHOICES = {"gyro": ("rad/s", "deg/s"), "accel": ("m/s2", "g", "mg"), "mag": ("uT", "gauss")}
 
 
 def _inferred_unit(log: LogInUse, triad: str) -> tuple[str, str]:
@@ -611,8 +690,24 @@ def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]
         "io.gyro-turns-against-gravity" if reversed_sense else "io.gyro-axes-differ",
         "gyro",
         axes=axes.value,
+        columns=_other_columns(log, str(axes.value)),
         reason=axes.finding(),
     )
+
+
+def _other_columns(log: LogInUse, axes: str) -> str:
+    """Return the statement by which the gyro has the axes of the accelerometer: ``x,y,-z``.
+
+    Of columns by quantity, with a minus before one that counts the other way.
+    """
+    columns = []
+    for axis, along in zip(AXES, axes.split(","), strict=True):
+        if axis != along:
+            name = log.found[f"gyro_{along[-1]}"].source
+            plain = reference(log.raw, name).removeprefix("-")
+            reversed_ = name.startswith("-") != along.startswith("-")
+            columns.append(f"gyro_{axis}={'-' if reversed_ else ''}{plain}")
+    return ",".join(columns)
 
 
 def _instead(unit: str, inferred: Inference, scale: Inference | None = None) -> str | None:

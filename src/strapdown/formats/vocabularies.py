@@ -118,7 +118,8 @@ TIMES = _words(
     "gpstow gpstime unixtime epoch epoc stamp elapsedtime timeelapsed timesincestart sampletime "
     "sensortime systemtime unixtimestamp datetime localtime utc utctime timeutc "
     "gpssecondsofweek secondsofweek gpst timeintervalsince1970 zeit zeitstempel temps tiempo tempo "
-    "rtctime chiptime utime offsettime heure hora ora tijd czas tid saat čas время 时间 時刻 "
+    "rtctime chiptime utime offsettime heure hora ora tijd czas tid saat čas aika idő zaman час "
+    "время 时间 時刻 時間 시간 "
     "datenum juliandate modifiedjuliandate jd mjd filetime gpsseconds ntptime ntptimestamp "
     "cfabsolutetime labviewtime secondsofday sod"
 )

@@ -28,6 +28,7 @@ from strapdown.sensors.health_log import (
     tail_limit,
     usual,
 )
+from strapdown.sensors.sampling_health import held_starts
 from strapdown.sensors.saturation import find_limits
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
@@ -64,12 +65,32 @@ def find_saturated(log: HealthLog) -> list[ChannelFault]:
         )
         clipped = np.zeros(log.time.size, dtype=bool)
         clipped[known] = limits.clipped[:, 0]
+        starts = _held(log, k) if clipped.any() else None
+        if starts is not None:
+            # A sample that is repeated is one: as often as there is a new one, it may be clipped.
+            limits = find_limits(
+                log.time[starts],
+                log.values[k, starts][:, None],
+                np.array([full]),
+                np.array([step]),
+                longest_flat=math.inf,
+            )
+            lengths = np.diff(np.append(starts, log.time.size))
+            clipped = np.repeat(limits.clipped[:, 0], lengths)
         code = "sensors.saturated-flat-top" if limits.found[0] else "sensors.saturated-at-range"
         for a, b in intervals_of(clipped, join):
             count = int(clipped[a : b + 1].sum())
             size = float(np.abs(log.values[k, a : b + 1][clipped[a : b + 1]]).max())
             faults.append(log.fault(k, "saturated", (a, b), size, size, code, count=count))
     return faults
+
+
+def _held(log: HealthLog, k: int) -> NDArray[np.int64] | None:
+    """First rows of the samples of a channel's triad, if they are repeated and none is missing."""
+    triad = [j for j, name in enumerate(log.names) if (name in GYRO) == (log.names[k] in GYRO)]
+    if any(log.wrong[j].any() for j in triad):
+        return None
+    return held_starts(np.column_stack([log.values[j] for j in triad]))
 
 
 # Consistency of the means at rest with gravity and the Earth's rate.

@@ -116,6 +116,22 @@ def _stamps(imu: pd.DataFrame) -> list[Finding]:
     ]
 
 
+def held_starts(values: Array) -> NDArray[np.int64] | None:
+    """Return the first rows of samples that are repeated until the sensor has a new one.
+
+    `values` ((n, k)): of a triad. None where its samples are not held.
+    """
+    new = np.any(values[1:] != values[:-1], axis=1)
+    starts = np.flatnonzero(np.concatenate([[True], new]))
+    lengths = np.diff(np.append(starts, len(values)))
+    length = float(lengths.mean())
+    if lengths.size < LEAST_STEPS or length < HELD:
+        return None
+    # Of independent repetitions, as of a quantized channel at rest.
+    chance = math.sqrt(length * (length - 1.0))
+    return starts if float(lengths.std()) < REGULAR * chance else None
+
+
 def _held(imu: pd.DataFrame) -> list[Finding]:
     """Find triads whose samples are repeated until the sensor has a new one."""
     out = []
@@ -124,15 +140,9 @@ def _held(imu: pd.DataFrame) -> list[Finding]:
         if columns[0] not in imu.columns:
             continue
         values = values_of(imu, columns)
-        new = np.any(values[1:] != values[:-1], axis=1)
-        starts = np.flatnonzero(np.concatenate([[True], new]))
-        lengths = np.diff(np.append(starts, len(values)))
-        length = float(lengths.mean())
-        if lengths.size < LEAST_STEPS or length < HELD:
-            continue
-        # Of independent repetitions, as of a quantized channel at rest.
-        chance = math.sqrt(length * (length - 1.0))
-        if float(lengths.std()) < REGULAR * chance:
+        starts = held_starts(values)
+        if starts is not None:
+            length = len(values) / starts.size
             out.append(
                 Finding(
                     "sensors.samples-held",

@@ -64,7 +64,7 @@ from strapdown.sensors.rest import (
 from strapdown.sensors.sampling_health import check_sampling, quantization_step
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.inputs import Memory, SavedRun
-from strapdown.systems.navigation_checks import MOST, longest_faults, unusable_samples
+from strapdown.systems.navigation_checks import longest_faults, most_unusable, unusable_samples
 from strapdown.systems.navigation_proposal import (
     CODE_POSITION_SD,
     CODE_VELOCITY_SD,
@@ -295,6 +295,10 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
     rests: tuple[RestStretch, ...] = ()
     if inertial.imu is not None:
         health, rests, found = _channels(inertial.imu)
+        silent = {f.quantity for f in found if f.data.get("kind") in ("stuck", "dead")}
+        findings = [
+            f for f in findings if f.code != "io.channel-constant" or f.quantity not in silent
+        ]
         rests = _unmoved(rests, streams)
         findings += found
         findings += _reference_against(streams)
@@ -842,24 +846,11 @@ def _samples(one: LogDiagnosis) -> list[Finding]:
     return [*found, *_lost_channels(one, imu)]
 
 
-def _noise_free(values: Array) -> bool:
-    """Whether channels are of a simulation without noise, in which a constant one may be right.
-
-    Of white noise the fourth differences exceed the second 3.4 times, of a smooth motion they are
-    far below.
-    """
-    second = np.diff(values, n=2, axis=0)
-    fourth = np.diff(second, n=2, axis=0)
-    return bool((np.square(fourth).mean(axis=0) <= np.square(second).mean(axis=0)).all())
-
-
 def _lost_channels(one: LogDiagnosis, imu: pd.DataFrame) -> list[Finding]:
     """Channels that do not read the motion: lost, or the faults of a part of the samples."""
     if one.health is None:
         return []
-    most_of = {**MOST, "dead": MOST["stuck"]}
-    if _noise_free(values_of(imu, one.health.channels)):
-        del most_of["dead"], most_of["stuck"]
+    most_of = most_unusable(values_of(imu, one.health.channels))
     lost: dict[str, tuple[int, bool]] = {}
     for (name, kind), count in unusable_samples(imu, one.health.faults).items():
         if (most := most_of.get(kind)) is not None:
@@ -930,11 +921,15 @@ _LIMITS = (
     "io.axes-upside-down",
     "io.force-scale",
     "io.gyro-axes-differ",
+    "io.gyro-axis-in-other-unit",
+    "io.gyro-axis-noise-of-other-unit",
     "io.gyro-scale",
     "io.gyro-turns-against-gravity",
     "navigation.course-shows-gyro-unit",
     "navigation.course-turns",
     "navigation.course-turns-opposite",
+    "navigation.forward-axis-elsewhere",
+    "navigation.forward-not-along-course",
 )
 
 

@@ -10,7 +10,9 @@ import numpy as np
 import pandas as pd
 
 from strapdown import rotation
+from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.dsp.samples import noise_free
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.error_model import ERROR_MODELS
 from strapdown.frames import ecef_from_geodetic, place_difference
@@ -18,6 +20,7 @@ from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.gnss_clock import WHOLE
 from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
+from strapdown.navigation.measurements.vehicle import NoSlip
 from strapdown.sensors.health_log import LEAST_SAMPLES, ChannelFault
 from strapdown.sensors.imu_health import check_imu_channels
 from strapdown.sensors.uncertainty import ImuUncertainty
@@ -56,18 +59,35 @@ def look_through(
     from strapdown.config.navigation import make_aids
 
     found: list[Finding] = []
+    yaw = _mounting_yaw(spec)
     for aid in make_aids(spec):
         table = tables.get(aid.name)
         if table is None:
             continue
         if isinstance(aid, Gnss):
             part = WHOLE if spec.log is None else spec.log.part_s(index_of(imu)[0])
-            found += gnss_readiness(table, imu, aid, part)
+            found += gnss_readiness(table, imu, aid, part, mounting_yaw=yaw)
             _refuse_far(spec, table, imu, aid)
             found += () if spec.log is None else _lever_arm(table, aid)
         elif isinstance(aid, TabulatedMeasurement):
             _refuse_apart(table, imu)
     return (*found, *_height(spec, imu))
+
+
+def _mounting_yaw(spec: NavigationSpec) -> float | None:
+    """Heading of the forward axis less that of the vehicle, rad, where the run assumes one.
+
+    An alignment by the course does, and wheels that do not slip.
+    """
+    from strapdown.config.navigation import make_aids
+
+    coarse = spec.coarse
+    if spec.start is None and coarse.kind == "gnss_course":
+        course = coarse.make()
+        assert isinstance(course, GnssCourse)
+        return math.radians(course.mounting_yaw_deg) + (math.pi if course.reverse else 0.0)
+    wheels = next((aid for aid in make_aids(spec) if isinstance(aid, NoSlip)), None)
+    return None if wheels is None else math.radians(wheels.yaw_deg)
 
 
 def finer_than_arm(table: pd.DataFrame) -> float | None:
@@ -183,7 +203,7 @@ def _height(spec: NavigationSpec, imu: pd.DataFrame) -> tuple[Finding, ...]:
 
 #: Faults that make a channel unusable, and their largest share of a record. A linear filter does
 #: not know the rotation that saturated samples lost.
-MOST = {"missing": 0.5, "stuck": 0.5, "saturated": 0.15}
+MOST = {"missing": 0.5, "stuck": 0.5, "dead": 0.5, "saturated": 0.15}
 #: Share of the largest reading of a saturated stretch that counts as saturated, too.
 AT_END = 0.999
 #: Approximate noise ratio to the data sheet of gyros in deg/s that are read as rad/s.
@@ -253,10 +273,22 @@ def _moves(tables: Mapping[str, pd.DataFrame], begin: float, end: float) -> bool
     return False
 
 
+def most_unusable(values: np.ndarray) -> dict[str, float]:
+    """Return the largest share of a record by kind of fault, of channels, (n, k).
+
+    In a simulation without noise a constant channel may be right.
+    """
+    if noise_free(values):
+        return {kind: most for kind, most in MOST.items() if kind not in ("dead", "stuck")}
+    return dict(MOST)
+
+
 def _usable(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, ...]:
     """The longest stretch of each channel and kind of fault; DataError: a channel is lost."""
-    for (channel, kind), count in unusable_samples(imu, faults).items():
-        if count > MOST.get(kind, 1.0) * len(imu):
+    lost = unusable_samples(imu, faults)
+    most = most_unusable(values_of(imu, [*GYRO, *ACCEL])) if lost else {}
+    for (channel, kind), count in lost.items():
+        if count > most.get(kind, 1.0) * len(imu):
             of_kind = [f for f in faults if (f.channel, f.kind) == (channel, kind)]
             longest = max(of_kind, key=lambda f: f.last - f.first).finding
             raise DataError(longest.explains("navigation.channel-lost"))

@@ -40,7 +40,7 @@ from strapdown.navigation.measurements.gnss_clock import (
     check_overlap,
     sure_delay,
 )
-from strapdown.navigation.measurements.gnss_course import check_turns
+from strapdown.navigation.measurements.gnss_course import check_forward, check_turns
 from strapdown.navigation.measurements.gnss_readiness import (
     check_fixes,
     float_position_sd,
@@ -310,6 +310,8 @@ def propose(
             clock["time_offset_sd_s"] = max(clock.get("time_offset_sd_s", 0.0), abs(step.size))
         if step is None and (unsure := unsure_steps(fixes)) and clock.get("time_offset_sd_s"):
             clock["clock_unsure_s"] = tuple((round(at, 3), sd) for at, sd in unsure)
+    if fixes is not None and chosen["coarse"]["kind"] == "gnss_course":
+        findings = (*findings, *check_forward(fixes, imu))
     if fixes is not None and sensors is not None and chosen["coarse"]["kind"] == "gnss_course":
         progress("trying alignments", 0.7)
         known = sensors, _as_warming(table["sensors"].get("warming"))

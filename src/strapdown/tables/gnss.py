@@ -48,6 +48,10 @@ LEAST_STEPS = 4
 # order or direction is taken to be right; the same of heights, whose errors are larger.
 UNLIKE, ALIKE = 0.3, 0.15
 UNLIKE_DOWN, ALIKE_DOWN, LEAST_CLIMB = 1.0, 0.3, 0.05
+# Heights that follow the integral of the velocity down: share explained, and in each half of the
+# fixes; how far the factor may be from that of a unit, and those of the halves from each other; the
+# fewest fixes, and the least root mean square of heights without their trend, m.
+FOLLOWS, FOLLOWS_HALF, OF_UNIT, OF_HALVES, LEAST_FIXES, LEAST_RISE = 0.95, 0.9, 0.05, 0.1, 20, 1.0
 # Share of the steps that are so long where velocities are said to be unlike, with twice the misfit:
 # a few of a receiver that stands are by chance.
 MOST = 0.5
@@ -293,7 +297,70 @@ def check_velocity(table: pd.DataFrame) -> Fit | None:
             row = int(np.flatnonzero(good)[climb.row]) + 1
             data = {"speed": climb.speed, "moved": climb.moved}
             raise DataError("tables.velocity-up", file=source, row=row, quantity="VD", **data)
+        _check_climb(source, time[good], at[:, 2], down[:, 0])
     return fit
+
+
+#: Units of heights and of velocities down that other tables have, with the factors to m and m/s.
+_HEIGHTS = {"m": 1.0, "ft": 0.3048}
+_CLIMBS = {
+    sign + u: k * SPEEDS[u]
+    for u in ("m/s", "ft/s", "ft/min", "km/h", "kn", "cm/s", "mm/s")
+    for sign, k in (("", 1.0), ("-", -1.0))
+}
+
+
+def _check_climb(source: str, time: Array, alt: Array, down: Array) -> None:
+    """Refuse heights, and velocities down, of another unit or sign, by how one follows the other.
+
+    Heights are fitted by the integral of the velocity, a constant and a trend, in all and in each
+    half, so that it is their own scatter that decides, and no stated standard deviation.
+
+    Parameters
+    ----------
+    time : ndarray, (n,), s
+    alt : ndarray, (n,), m
+    down : ndarray, (n,), m/s
+    """
+    if time.size < LEAST_FIXES:
+        return
+    fallen = running_integral(time, down[:, None])[:, 0]
+    half = time.size // 2
+    parts = [slice(None), slice(None, half), slice(half, None)]
+    (factor, share), *halves = [_rise(time[p], alt[p], -fallen[p]) for p in parts]
+    if share < FOLLOWS or min(s for _, s in halves) < FOLLOWS_HALF:
+        return
+    if any(abs(k / factor - 1.0) > OF_HALVES for k, _ in halves):
+        return
+    pairs = {(h, c): k / hk for h, hk in _HEIGHTS.items() for c, k in _CLIMBS.items()}
+    best = min(pairs, key=lambda one: abs(pairs[one] / factor - 1.0))
+    if abs(factor - 1.0) < UNLIKE or abs(pairs[best] / factor - 1.0) > OF_UNIT:
+        return
+    stated = {"alt": best[0]} if best[0] != "m" else {}
+    stated |= {"VD": best[1]} if best[1] != "m/s" else {}
+    raise DataError(
+        "tables.heights-unlike-climb",
+        file=source,
+        quantity="alt" if "alt" in stated else "VD",
+        factor=factor,
+        percent=100.0 * share,
+        units=[f"{quantity} in {unit}" for quantity, unit in stated.items()],
+        python="{" + ", ".join(f'"{q}": "{u}"' for q, u in stated.items()) + "}",
+        flags="--gnss-units " + ",".join(f"{q}={u}" for q, u in stated.items()),
+        keys="units = {" + ", ".join(f'{q} = "{u}"' for q, u in stated.items()) + "}",
+    )
+
+
+def _rise(time: Array, alt: Array, risen: Array) -> tuple[float, float]:
+    """Return the factor of the integral of a velocity by which heights follow it, and the share."""
+    trend = np.column_stack([np.ones(time.size), time - time.mean()])
+    both = np.column_stack([alt, risen])
+    both = both - trend @ np.linalg.lstsq(trend, both, rcond=None)[0]
+    whole, size = float(both[:, 0] @ both[:, 0]), float(both[:, 1] @ both[:, 1])
+    if whole < time.size * LEAST_RISE**2 or size == 0.0:
+        return 1.0, 0.0
+    factor = float(both[:, 0] @ both[:, 1]) / size
+    return factor, factor**2 * size / whole
 
 
 #: Factors to s of stamps that count in another unit than the one that is stated.

@@ -64,10 +64,28 @@ def test_sections_are_joined(tmp_path, titles):
     assert "io.csv-sections-joined" in [f.code for f in imu.findings]
 
 
-def test_a_section_of_fixes_is_not_read_as_samples(tmp_path):
-    fixes = [f"{k},48.0,11.{k:03d},500,1.0,1.0,2.0" for k in range(15)]
-    lines = [*table(ROWS), "time,lat,lon,alt,north_sd,east_sd,down_sd", *fixes]
-    check(sd.read_imu(written(tmp_path, "log.csv", lines)))
+@pytest.mark.parametrize("first", [False, True])
+def test_a_section_of_fixes_is_a_stream_of_its_own(tmp_path, first):
+    fixes = ["time,lat,lon,alt,north_sd,east_sd,down_sd"]
+    fixes += [f"{k},48.0,11.{k:03d},500,1.0,1.0,2.0" for k in range(15)]
+    samples = table(ROWS)
+    lines = [*fixes, *samples] if first else [*samples, *fixes]
+    path = written(tmp_path, "log.csv", lines)
+    check(sd.read_imu(path))
+    read = sd.read(path)
+    assert set(read) >= {"imu", "gnss"}
+    np.testing.assert_allclose(read["gnss"]["lon"], 11.0 + 1e-3 * np.arange(15))
+    np.testing.assert_array_equal(read["gnss"].index, np.arange(15.0))
+    np.testing.assert_allclose(sd.read_gnss(path)["lon"], read["gnss"]["lon"])
+
+
+def test_rows_whose_first_word_says_their_kind_are_not_one_table(tmp_path):
+    """Rows of samples and of fixes with as many fields, and no line of names."""
+    rows = [f"IMU,{k / 100},0.01,0.02,0.03,0.1,0.2,9.8" for k in range(400)]
+    rows += [f"GPS,{k},48.0,11.{k:03d},500,1.0,2.0,0.0" for k in range(4)]
+    rows.sort(key=lambda row: float(row.split(",")[1]))
+    with pytest.raises(DataError, check=coded("io.csv-rows-of-kinds")):
+        sd.read_imu(written(tmp_path, "log.csv", rows))
 
 
 @pytest.mark.parametrize("clocks", [("time", "time"), ("gyro_t_s", "accel_t_s"), ("t", "acc_time")])

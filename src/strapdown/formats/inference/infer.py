@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError
 from strapdown.formats.arrays import numbers, ticks_of
-from strapdown.formats.find_columns import AXES, Column, find_columns
+from strapdown.formats.find_columns import AXES, Column, find_columns, with_reversed
 from strapdown.formats.inference.conclusion import (
     Inference,
     Steps,
@@ -68,7 +68,7 @@ def infer(raw: RawLog, options: ReadOptions | None = None) -> tuple[Inference, .
     numbers for. ConfigError: an option names a column that the log does not have. DataError: a
     value or a stamp is not a number.
     """
-    options = options or ReadOptions()
+    raw, options = with_reversed(raw, options or ReadOptions())
     found = find_columns(raw, options)
     stamps, unit = None, None
     if "time" in found:

@@ -122,6 +122,7 @@ def infer_gyro(
     by_scale: dict[float, dict[Hypothesis, float]] = {}
     stood: list[Finding] = []
     scale_of_all: Scale | None = None
+    odd: Finding | None = None
     for tau, share in likely.items():
         factor = factor_of(tau, TIME_UNITS)
         step = Steps.of(ticks).mean * factor
@@ -146,7 +147,7 @@ def infer_gyro(
         base[None, "other", tau] = float(np.log(share * _OTHER))
         found = turns(ticks * factor, gyro, force) if force is not None else ()
         if share > 0.5:
-            scale_of_all = scale_by_gravity(found)
+            scale_of_all, odd = scale_by_gravity(found), axis_in_other_unit(found)
         for key, (scale, _) in candidates.items():
             beyond = [(turn.beyond_stillness(scale), turn.half_width) for turn in found]
             beyond = sorted((b for b in beyond if b[0] > STILL_TURN), reverse=True)
@@ -213,11 +214,16 @@ def infer_gyro(
     said_form = conclude("gyro_form", marginal(total, 1), told)
     times = {str(k): v for k, v in marginal(total, 3).items()}
     said_axes = conclude("gyro_axes", axes, told, "--columns")
-    return said_unit, said_form, said_axes, _said_of_scale(scale_of_all), times
+    return said_unit, said_form, said_axes, _said_of_scale(scale_of_all, odd), times
 
 
-def _said_of_scale(scale: Scale | None) -> Inference:
-    """Return the factor to rad/s by which a gyro explains the turning of gravity, if one does."""
+def _said_of_scale(scale: Scale | None, odd: Finding | None) -> Inference:
+    """Return the factor to rad/s by which a gyro explains the turning of gravity, if one does.
+
+    `odd`: evidence that one axis has another than the others.
+    """
+    if odd is not None:
+        return Inference("gyro_scale", None, 1.0, (odd,))
     if scale is None:
         return Inference("gyro_scale", None, 1.0, (evidence("io.evidence-no-turn-of-gravity"),))
     told = evidence(
@@ -538,6 +544,49 @@ def scale_by_gravity(found: Sequence[Turn]) -> Scale | None:
     sd = float(np.sqrt(sds.min() ** 2 + np.var(factors) + (_SCALE_SD * mean) ** 2))
     explained = min(one for *_, one in rows)
     return Scale(mean, mean - 1.96 * sd, mean + 1.96 * sd, names[rows[0][0]], explained)
+
+
+#: How much more of the turning of gravity a gyro with one axis in another unit must explain than
+#: any gyro of one unit.
+_MORE = 0.1
+
+
+def axis_in_other_unit(found: Sequence[Turn]) -> Finding | None:
+    """Find one axis of a gyro in deg/s beside two in rad/s, or the reverse, by turning gravity.
+
+    `found`: sums of time scales, of which two at least have to agree. Returns evidence with the
+    axis, the unit that it has beside the others, and the least share explained; None otherwise.
+    """
+    kinds = [(k, factor) for k in range(3) for factor in (np.degrees(1.0), np.radians(1.0))]
+    m = np.array([np.diag([1.0 / f if j == k else 1.0 for j in range(3)]) for k, f in kinds])
+    alike, rows = signed_permutations()[1].reshape(-1, 9), []
+    for turn in found:
+        if turn.signal < LEAST_TURN:
+            continue
+        mixed, plain = _shares(turn, m.reshape(-1, 9)), _shares(turn, alike)
+        best = int(np.argmax(mixed))
+        if mixed[best] >= _EXPLAINED and mixed[best] > plain.max() + _MORE:
+            rows.append((best, float(mixed[best])))
+        elif plain.max() >= _EXPLAINED:
+            return None
+    if len(rows) < LEAST_SCALES or len({best for best, _ in rows}) > 1:
+        return None
+    k, factor = kinds[rows[0][0]]
+    units = ("deg/s", "rad/s") if factor > 1.0 else ("rad/s", "deg/s")
+    return evidence(
+        "io.evidence-axis-in-other-unit",
+        axis="xyz"[k],
+        unit=units[0],
+        others=units[1],
+        percent=100.0 * min(share for _, share in rows),
+    )
+
+
+def _shares(turn: Turn, m: Array) -> Array:
+    """Return the share of the turning that each of (n, 9) matrices explains, by its own factor."""
+    size = np.maximum(np.einsum("ni,ij,nj->n", m, turn.gram[:9, :9], m), 1e-300)
+    factor = m @ turn.gram[:9, 9] / size
+    return np.where(factor > 0.0, factor**2 * size / turn.gram[9, 9], 0.0)
 
 
 def turns(time: Array, gyro: Array, force: Array) -> tuple[Turn, ...]:

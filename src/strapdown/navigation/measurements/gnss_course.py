@@ -44,6 +44,13 @@ TOO_FAR, TOO_FAR_SHARE = 1.5, 0.95
 DEGREES, ABOUT = 180.0 / math.pi, 1.5
 #: Mean specific force that is gravity, m/s².
 GRAVITY = (8.0, 12.0)
+#: Seconds over which a change of velocity is compared with the integral of the specific force;
+#: bounds of the ratio of both; and the largest standard deviation of a direction, rad, of which
+#: five are less than a quarter of a turn.
+CHANGE, FORCES, SURE = 5.0, (0.6, 1.5), math.radians(15.0)
+#: Angles of the forward axis from the direction of motion that are no other mounting, and by which
+#: signed axes may miss one, rad.
+MOUNTED, ALONG = math.radians(30.0), math.radians(20.0)
 
 
 @dataclass(frozen=True)
@@ -145,19 +152,9 @@ def turn_ratio(
     nodes, sums = integrals(stamps, imu, GYRO, imu.attrs["sampling"] == "mean")
     turned = np.interp(at, nodes, sums @ (-force / size))
     speed = np.hypot(*velocity.T)
-    usual = (speed > MOVES) & (at >= stamps[0]) & (at <= stamps[-1])
-    breaks = np.cumsum(~usual | np.append(False, np.diff(at) > LONGEST))
-    pairs = []
-    begin = 0
-    ends = np.searchsorted(at, at + WINDOW)
-    while begin < len(at) and (end := int(ends[begin])) < len(at):
-        whole = usual[begin] and breaks[begin] == breaks[end]
-        if whole:
-            pairs.append((begin, end))
-        begin = end if whole else begin + 1
-    if len(pairs) < LEAST_WINDOWS:
+    first, last = _windows(at, speed, stamps, WINDOW)
+    if len(first) < LEAST_WINDOWS:
         return None
-    first, last = np.array(pairs).T
     weight = 1.0 / np.sqrt(speed[first] ** -2 + speed[last] ** -2 + SLIPS**-2)
     change = weight * (course[last] - course[first])
     X = weight[:, None] * np.column_stack([turned[last] - turned[first], at[last] - at[first]])
@@ -180,6 +177,139 @@ def turn_ratio(
     if share < LEAST_SHARE or abs(slope) <= SIGNIFICANT * sd:
         return None
     return TurnRatio(1.0 / slope, sd / slope**2, share, len(change))
+
+
+def _windows(at: Array, speed: Array, stamps: Array, length: float) -> NDArray[np.int64]:
+    """Return the first and last number, (2, m), of windows of a length, in s, in which it moves."""
+    usual = (speed > MOVES) & (at >= stamps[0]) & (at <= stamps[-1])
+    breaks = np.cumsum(~usual | np.append(False, np.diff(at) > LONGEST))
+    pairs = []
+    begin = 0
+    ends = np.searchsorted(at, at + length)
+    while begin < len(at) and (end := int(ends[begin])) < len(at):
+        whole = usual[begin] and breaks[begin] == breaks[end]
+        if whole:
+            pairs.append((begin, end))
+        begin = end if whole else begin + 1
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+
+
+def forward_direction(
+    gnss: pd.DataFrame, imu: pd.DataFrame, velocity_delay: float = 0.0
+) -> tuple[Array, Array, float] | None:
+    """Find where the direction of motion is in the axes of the body.
+
+    Parameters
+    ----------
+    velocity_delay : float, s
+        Of the receiver.
+
+    Returns
+    -------
+    forward, down : ndarray, (3,)
+        Unit vectors in body axes, the first across the second.
+    sd : float, rad
+        Of the first about the second. None if the body does not accelerate as a vehicle that
+        points along its course, or too little.
+
+    Notes
+    -----
+    In windows of five seconds the change of the speed, and the speed times the change of the
+    course, are the integrals of the specific force forward and right of a body that turns with its
+    course. As complex numbers they differ by one factor, whose angle is that of the mounting; the
+    tilt of the mean specific force is a second unknown.
+    """
+    told = courses(gnss, velocity_delay, COURSE_STEP)
+    if told is None or ACCEL[0] not in imu.columns:
+        return None
+    at, velocity = told
+    stamps, speed = index_of(imu), np.hypot(*velocity.T)
+    first, last = _windows(at, speed, stamps, CHANGE)
+    force = np.array([float(one.mean()) for one in channels_of(imu, ACCEL)])
+    size = float(np.linalg.norm(force))
+    if len(first) < LEAST_WINDOWS or not GRAVITY[0] < size < GRAVITY[1]:
+        return None
+    down = -force / size
+    across = np.eye(3)[np.abs(down).argmin()]
+    across -= down * (across @ down)
+    across /= np.linalg.norm(across)
+    course = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
+    sideways = np.append(0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(course)))
+    change = (speed + 1j * sideways)[last] - (speed + 1j * sideways)[first]
+    nodes, sums = integrals(stamps, imu, ACCEL, imu.attrs["sampling"] == "mean")
+    gained = np.interp(at, nodes, sums @ across) + 1j * np.interp(
+        at, nodes, sums @ np.cross(down, across)
+    )
+    gained = gained[last] - gained[first]
+    X = np.column_stack([change, at[last] - at[first]])
+    kept = np.ones(len(change), dtype=bool)
+    for _ in range(10):
+        fit, *_ = np.linalg.lstsq(X[kept], gained[kept], rcond=None)
+        left = np.abs(gained - X @ fit)
+        before, kept = kept, left <= GROSS * float(np.median(left[kept]))
+        if np.array_equal(before, kept):
+            break
+    if kept.sum() < max(LEAST_WINDOWS, COUNT * len(kept)):
+        return None
+    X, gained, left = X[kept], gained[kept], left[kept]
+    alone = gained - X[:, 1] * (X[:, 1] @ gained) / (X[:, 1] @ X[:, 1])
+    share = 1.0 - float(left @ left) / max(float((np.abs(alone) ** 2).sum()), 1e-300)
+    ratio, inverse = complex(fit[0]), np.linalg.pinv(X.conj().T @ X)
+    spread = inverse @ (X.conj().T * left**2) @ X @ inverse
+    sd = math.sqrt(float(spread[0, 0].real)) / max(abs(ratio), 1e-300)
+    if share < LEAST_SHARE or not FORCES[0] < abs(ratio) < FORCES[1] or sd > SURE:
+        return None
+    way = ratio / abs(ratio)
+    return way.real * across + way.imag * np.cross(down, across), down, sd
+
+
+def check_forward(
+    gnss: pd.DataFrame,
+    imu: pd.DataFrame,
+    velocity_delay: float = 0.0,
+    mounting_yaw: float = 0.0,
+) -> list[Finding]:
+    """Report a body whose forward axis does not point where it drives.
+
+    Parameters
+    ----------
+    velocity_delay : float, s
+        Of the receiver.
+    mounting_yaw : float, rad
+        Heading of the forward axis less that of the vehicle, as it is configured.
+    """
+    found = forward_direction(gnss, imu, velocity_delay)
+    if found is None:
+        return []
+    forward, down, sd = found
+    c, s = math.cos(mounting_yaw), math.sin(mounting_yaw)
+    axis = c * forward + s * np.cross(down, forward)  # where the forward axis then is
+    off = math.acos(float(np.clip(axis[0], -1.0, 1.0)))
+    if off < MOUNTED or off < SIGNIFICANT * sd:
+        return []
+    body = np.array([forward, np.cross(down, forward), down])
+    order = np.abs(body).argmax(axis=1)
+    signs = np.sign(body[np.arange(3), order])
+    near = bool((np.abs(body[np.arange(3), order]) > math.cos(ALONG)).all())
+    yaw = math.degrees(math.atan2(float(body[1, 0]), float(body[0, 0])))
+    data: dict[str, Any] = {
+        "off_deg": math.degrees(off),
+        "sd_deg": math.degrees(sd),
+        "yaw_deg": yaw,
+        "fixes": source_of(gnss),
+    }
+    where: dict[str, Any] = {"file": source_of(imu), "quantity": "axes"}
+    if not near:
+        return [Finding("navigation.forward-not-along-course", data=data, **where)]
+    # Axes of the sensor that point forward, right, down, by those that are taken to do so.
+    of_sensor = str(imu.attrs.get("sensor_axes", "x,y,z")).split(",")
+    names = []
+    for k, sign in zip(order, signs, strict=True):
+        letter = of_sensor[k].removeprefix("-")
+        minus = of_sensor[k].startswith("-") != (sign < 0.0)
+        names.append(f"-{letter}" if minus else letter)
+    data["axes"] = ",".join(names)
+    return [Finding("navigation.forward-axis-elsewhere", data=data, **where)]
 
 
 def check_turns(

@@ -22,7 +22,7 @@ from strapdown.navigation.measurements.gnss_clock import (
     sure_delay,
     time_offset,
 )
-from strapdown.navigation.measurements.gnss_course import check_turns
+from strapdown.navigation.measurements.gnss_course import check_forward, check_turns
 from strapdown.tables import (
     GEODETIC,
     POSITION_SD,
@@ -40,13 +40,14 @@ def gnss_readiness(
     imu: pd.DataFrame | None = None,
     aid: Gnss | None = None,
     part: tuple[float, float] = WHOLE,
+    mounting_yaw: float | None = 0.0,
 ) -> tuple[Finding, ...]:
     """Check fixes by themselves, and against the inertial record, with the offset of their clock.
 
     Parameters and errors as of `receiver_findings`.
     """
     aid = aid or Gnss(name="gnss")
-    found = receiver_findings(table, imu, aid, part)
+    found = receiver_findings(table, imu, aid, part, mounting_yaw)
     if imu is None:
         return tuple(found)
     offset = time_offset(table, imu, aid.velocity_delay or sure_delay(table))
@@ -58,6 +59,7 @@ def receiver_findings(
     imu: pd.DataFrame | None = None,
     aid: Gnss | None = None,
     part: tuple[float, float] = WHOLE,
+    mounting_yaw: float | None = 0.0,
 ) -> list[Finding]:
     """Check fixes by themselves, and against the inertial record on its clock.
 
@@ -71,6 +73,9 @@ def receiver_findings(
         As it is configured: options already set are not reported again.
     part : (2,), s
         Of the record that was asked for, on the clock of `imu`.
+    mounting_yaw : float, optional, rad
+        Heading of the forward axis less that of the vehicle, as configured; None where nothing
+        takes it to point where the body moves.
 
     Returns
     -------
@@ -93,7 +98,11 @@ def receiver_findings(
     step = stamp_step(table)
     if step is not None and step.certain:
         found.append(step_finding(table, imu, step))
-    return found + check_turns(table, imu, aid.velocity_delay or sure_delay(table))
+    delay = aid.velocity_delay or sure_delay(table)
+    found += check_turns(table, imu, delay)
+    if mounting_yaw is not None:
+        found += check_forward(table, imu, delay, mounting_yaw)
+    return found
 
 
 def white_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float, float] | None:
