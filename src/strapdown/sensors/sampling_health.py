@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from strapdown.errors import Finding
 from strapdown.tables import ACCEL, GYRO
