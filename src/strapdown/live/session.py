@@ -309,9 +309,9 @@ class Session:
             else:
                 self._use(self._estimate.say, one, arrived)
 
-    def not_used(self, bad: BadLineError, line: int | None = None) -> None:
+    def not_used(self, bad: BadLineError) -> None:
         """Count what was not used, and report the first of its kind."""
-        count_unused(self.unused, bad, line, self._warn)
+        count_unused(self.unused, bad, None, self._warn)
 
     def finish(self) -> dict[str, Any]:
         """End the session; return what ``latency.json`` holds."""

@@ -400,12 +400,11 @@ def thin_fill(
     colour: str,
     *,
     opacity: float = 0.18,
-    legend: bool = True,
     buckets: int = BUCKETS_OVER_TIME // 2,
 ) -> Fill:
     """Make a band of few points that keeps the lowest and highest values."""
     rows = kept_rows((low, high), buckets)
-    return Fill(name, x[rows], low[rows], high[rows], colour, opacity, legend)
+    return Fill(name, x[rows], low[rows], high[rows], colour, opacity)
 
 
 def broken(time: Array, *columns: Array, longest: float = 5.0) -> tuple[Array, ...]:

@@ -257,7 +257,6 @@ def trajectory_chart(
     title: str,
     names: tuple[str, str] = ("trajectory", "other"),
     ellipsoid: Ellipsoid = WGS84,
-    slug: str = "trajectory",
 ) -> Chart:
     """Chart a trajectory: plan, height, speed and attitude over time.
 
@@ -269,8 +268,6 @@ def trajectory_chart(
         A second one on the same clock, a reference or an estimate, drawn over the first.
     names : (str, str)
         Of the two, for the legend; a single trajectory has no legend.
-    slug : str
-        File name.
 
     Returns
     -------
@@ -318,7 +315,7 @@ def trajectory_chart(
     )
     if reach >= NO_PATH:
         words += [d.left_out for d in drawn if d.left_out]
-    return Chart(slug, title, " ".join(words), "time, s", tuple(panels))
+    return Chart("trajectory", title, " ".join(words), "time, s", tuple(panels))
 
 
 def _drawn(

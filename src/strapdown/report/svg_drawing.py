@@ -60,11 +60,11 @@ def text_width(text: str, size: float, bold: bool = False) -> float:
     return ems * size * (1.08 if bold else 1.0)
 
 
-def shortened(text: str, width: float, size: float, bold: bool = False) -> str:
+def shortened(text: str, width: float, size: float) -> str:
     """Cut a text longer than a width in pixels, marked by an ellipsis."""
-    if text_width(text, size, bold) <= width:
+    if text_width(text, size) <= width:
         return text
-    while text and text_width(text + "…", size, bold) > width:
+    while text and text_width(text + "…", size) > width:
         text = text[:-1]
     return text.rstrip() + "…"
 
@@ -172,15 +172,13 @@ class Drawing:
         radius: float,
         colour: str | None = INK,
         width: float = 1.0,
-        dash: str = "solid",
         *,
         fill: str | None = None,
-        opacity: float = 1.0,
     ) -> None:
         """Draw a circle."""
         x, y = centre
         at = f'cx="{number(x)}" cy="{number(y)}" r="{number(radius)}"'
-        self._parts.append(f"<circle {at}{_fill(fill, opacity)}{_stroke(colour, width, dash)}/>")
+        self._parts.append(f"<circle {at}{_fill(fill, 1.0)}{_stroke(colour, width, 'solid')}/>")
 
     def curve(
         self,

@@ -370,12 +370,12 @@ def _right_handed() -> list[Array]:
 
 
 def report_transposed(
-    matrix: Array, force: Sequence[float] | Array, file: str, quantity: str = "matrix"
+    matrix: Array, force: Sequence[float] | Array, file: str
 ) -> tuple[Finding, ...]:
     """Report a matrix that appears transposed: gravity is level only with its transpose.
 
     `matrix` ((3, 3)). `force` ((3,), m/s²): mean specific force in body axes, after applying the
-    matrix. `file`, `quantity`: for messages.
+    matrix. `file`: for messages.
     """
     body = np.asarray(force, dtype=np.float64)
     size = float(np.linalg.norm(body))
@@ -388,6 +388,6 @@ def report_transposed(
     tilt = float(np.degrees(np.arccos(np.clip(-up[2], -1.0, 1.0))))
     return (
         Finding(
-            "sensors.matrix-looks-transposed-body-lies", file=file, quantity=quantity, tilt=tilt
+            "sensors.matrix-looks-transposed-body-lies", file=file, quantity="matrix", tilt=tilt
         ),
     )
