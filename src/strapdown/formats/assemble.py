@@ -122,8 +122,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     )
     if ticks is not None and ticks.size > 2 and raw.truth is None and step_range(ticks)[1] < 0:
         return assemble(raw.backward(), options, keep=keep)
-    if ticks is not None and raw.truth is None and (order := _even_order(ticks)) is not None:
-        return assemble(raw.in_order(order, "io.rows-out-of-order"), options, keep=keep)
+    if ticks is not None and raw.truth is None and (in_time := _even_order(ticks)) is not None:
+        return assemble(raw.in_order(in_time, "io.rows-out-of-order"), options, keep=keep)
     if ticks is not None and dated:
         _report_dates(log, found["time"].source)
     even = None
@@ -906,7 +906,7 @@ def _report_constant(log: LogInUse, body: Mapping[str, Array], axis: Sequence[in
             continue
         if noise_free(np.column_stack([c[:SOME] for c in channels])):
             continue
-        for k in np.flatnonzero(constant):
+        for k in np.flatnonzero(constant).tolist():
             log.warn(
                 "io.channel-constant",
                 f"{triad}_{AXES[k]}",

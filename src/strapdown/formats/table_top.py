@@ -330,8 +330,8 @@ def stated_units(above: list[str], columns: dict[str, NDArray[Any]]) -> dict[str
 def _counts(triad: str, text: str, of_16_bits: bool) -> str | None:
     """Return the unit of raw counts that a text states."""
     if triad == "accel" and (m := _ONE_G.match(text)) and float(m[1]):
-        scale, unit = f"/{m[1]}", "g"
-    elif m := _PER_UNIT.search(text):
+        return f"g/{m[1]}"
+    if m := _PER_UNIT.search(text):
         scale, unit = f"/{m[1]}", unit_of(m[2])
     elif m := _PER_COUNT.search(text):
         return f"{m[1]} {of}" if (of := unit_of(m[2])) in _KNOWN[triad] else None

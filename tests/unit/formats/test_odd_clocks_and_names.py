@@ -65,6 +65,13 @@ def test_words_for_time_and_its_unit_in_other_languages(tmp_path, name):
     check(sd.read_imu(written(tmp_path, [",".join([name, *SI]), *lines])))
 
 
+def test_a_letter_beside_a_word_of_clocks(tmp_path):
+    lines = [f"{1.7e9 + t:.2f},{body}" for t, body in zip(T, BODY, strict=True)]
+    imu = sd.read_imu(written(tmp_path, [",".join(["t_unix", *SI]), *lines]))
+    check(imu)
+    assert imu.attrs["clock"] == "unix"
+
+
 def test_fractions_without_zeros(tmp_path):
     """0.98, 0.99, 0.100: thousandths of a second after the point, as a program printed them."""
     stamps = [divmod(10 * k, 1000) for k in range(N)]
