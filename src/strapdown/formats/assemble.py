@@ -892,6 +892,10 @@ WEIGHTLESS = 0.3 * STANDARD_GRAVITY  # m/s²
 SOME = 100_000
 
 
+#: Fewest samples of a channel that never changes; a few may be alike by chance.
+LASTING = 100
+
+
 def _report_constant(log: LogInUse, body: Mapping[str, Array], axis: Sequence[int]) -> None:
     """Warn of a channel that never changes beside others that have the noise of a sensor.
 
@@ -901,6 +905,8 @@ def _report_constant(log: LogInUse, body: Mapping[str, Array], axis: Sequence[in
         if triad not in body:
             continue
         channels = body[triad].T
+        if channels[0].size < LASTING:
+            continue
         constant = [bool((c[:SOME] == c[0]).all() and (c == c[0]).all()) for c in channels]
         if not any(constant) or all(constant):
             continue
