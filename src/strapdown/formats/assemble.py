@@ -122,8 +122,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     )
     if ticks is not None and ticks.size > 2 and raw.truth is None and step_range(ticks)[1] < 0:
         return assemble(raw.backward(), options, keep=keep)
-    if ticks is not None and raw.truth is None and (order := _even_order(ticks)) is not None:
-        return assemble(raw.in_order(order, "io.rows-out-of-order"), options, keep=keep)
+    if ticks is not None and raw.truth is None and (in_time := _even_order(ticks)) is not None:
+        return assemble(raw.in_order(in_time, "io.rows-out-of-order"), options, keep=keep)
     if ticks is not None and dated:
         _report_dates(log, found["time"].source)
     even = None
@@ -892,6 +892,10 @@ WEIGHTLESS = 0.3 * STANDARD_GRAVITY  # m/s²
 SOME = 100_000
 
 
+#: Fewest samples of a channel that never changes; a few may be alike by chance.
+LASTING = 100
+
+
 def _report_constant(log: LogInUse, body: Mapping[str, Array], axis: Sequence[int]) -> None:
     """Warn of a channel that never changes beside others that have the noise of a sensor.
 
@@ -901,12 +905,14 @@ def _report_constant(log: LogInUse, body: Mapping[str, Array], axis: Sequence[in
         if triad not in body:
             continue
         channels = body[triad].T
+        if channels[0].size < LASTING:
+            continue
         constant = [bool((c[:SOME] == c[0]).all() and (c == c[0]).all()) for c in channels]
         if not any(constant) or all(constant):
             continue
         if noise_free(np.column_stack([c[:SOME] for c in channels])):
             continue
-        for k in np.flatnonzero(constant):
+        for k in np.flatnonzero(constant).tolist():
             log.warn(
                 "io.channel-constant",
                 f"{triad}_{AXES[k]}",

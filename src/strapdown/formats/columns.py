@@ -193,8 +193,8 @@ def _of_format(text: str, index: str) -> ColumnName | None:
         return ColumnName("time", "s")
     if len(text) <= LONGEST and (match := _DELSYS.fullmatch(text)):
         triad = {"ACC": "accel", "GYRO": "gyro", "MAG": "mag"}[match["triad"]]
-        unit = unit_of(match["unit"] or "")
-        return ColumnName(f"{triad}_{match['axis'].lower()}", unit, family=match["of"])
+        of_column = unit_of(match["unit"] or "")
+        return ColumnName(f"{triad}_{match['axis'].lower()}", of_column, family=match["of"])
     if len(text) <= LONGEST and (match := OF_BROWSER.fullmatch(text)):
         axis = {"alpha": "x", "beta": "y", "gamma": "z"}[match[2].lower()]
         return ColumnName(f"gyro_{axis}", "deg/s", family=match[1].lower())
@@ -477,7 +477,8 @@ def _of_words(words: list[str]) -> ColumnName | None:
 
 def _is_clock(words: list[str]) -> bool:
     clock = {"time", "timestamp", "timestamps", "stamp"} & set(words) and set(words) <= OF_TIME
-    return bool(clock) or words == ["date"]
+    letter = words[:1] == ["t"] and len(words) > 1 and set(words[1:]) <= OF_TIME  # t_unix
+    return bool(clock) or letter or words == ["date"]
 
 
 def _of_heading(text: str, written: str, said: ColumnName, of: Vocabulary) -> ColumnName:

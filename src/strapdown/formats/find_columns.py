@@ -155,7 +155,7 @@ def with_reversed(raw: RawLog, options: ReadOptions) -> tuple[RawLog, ReadOption
     A file may have a column of that name already. ConfigError: as of `find_columns`.
     """
     columns = dict(options.columns)
-    reversed_ = {}
+    reversed_: dict[str, str] = {}
     for quantity, source in options.columns.items():
         triad = quantity.partition("_")[0]
         if not source.startswith("-") or source in raw.columns or triad not in TRIADS:

@@ -91,7 +91,8 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         week = values("week")
         time = time + WEEK * (week - week[0])
         clock = Clock(GPS, 0.0, int(week[0]))
-    velocity, velocity_sd = block(VELOCITY), block(VELOCITY_SD)
+    level = found.keys() & {*VELOCITY[:2]}  # a climb alone is beside a speed and a course
+    velocity, velocity_sd = block(VELOCITY) if level else None, block(VELOCITY_SD)
     position_sd = block(POSITION_SD)
     if velocity is not None and velocity_sd is None and "speed_sd" in found:
         velocity_sd = _sd_of_speed(raw, found, values)
@@ -407,7 +408,7 @@ def _over_ground(
     values: Callable[[str], Array],
     positions: tuple[Array, Array],
 ) -> tuple[Array | None, Array | None]:
-    """Return velocity by speed and course, and its standard deviation; down is unknown.
+    """Return velocity by speed and course, and its standard deviation; down as far as there is one.
 
     Phones write -1 for a speed or a course that they do not know; None where they never do. Other
     courses below zero are those of angles from -180 deg. `positions`: seconds, (n,), and deg, deg,
@@ -421,7 +422,11 @@ def _over_ground(
     speed = np.where(known, speed, np.nan)
     none = np.full(speed.size, np.nan)
     raw.note(
-        "io.speed-and-course-never-known" if never else "io.velocity-by-speed-and-course",
+        "io.speed-and-course-never-known"
+        if never
+        else "io.velocity-by-speed-course-and-climb"
+        if "VD" in found
+        else "io.velocity-by-speed-and-course",
         quantity=", ".join(VELOCITY),
         source=found["speed"].source,
         source_2=found["course"].source,
@@ -435,7 +440,8 @@ def _over_ground(
         stated = values("speed_sd")
         sd = np.where(known & (stated > 0.0), stated, np.nan)
         sd = np.column_stack([sd, sd, none])
-    return np.column_stack([along_course(speed, np.radians(course)), none]), sd
+    down = values("VD") if "VD" in found else none
+    return np.column_stack([along_course(speed, np.radians(course)), down]), sd
 
 
 def _is_signed(course: Array) -> bool:

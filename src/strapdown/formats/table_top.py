@@ -27,13 +27,15 @@ from strapdown.formats.text_columns import (
     is_data,
     separator_of,
 )
-from strapdown.units import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, unit_of
+from strapdown.units import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, OF_TABLES, unit_of
 
 _UNIT = re.compile(r"\s*[\[(].*")
 _REMARK = re.compile(r"\s*\([^()]*\)|\s*\[[^\[\]]*\]")
 # A unit in brackets; those within it, as of m/(s^2), are its own.
 _ENCLOSED = re.compile(r"^[\[({]\s*(.*?)\s*[\])}]$")
 _CALIBRATED = {"cal", "raw", "uncal"}
+# The level behind the unit of a height.
+_LEVEL = re.compile(r"(ft|feet|m)\s+(?:msl|agl|baro|wgs ?84|hae|gps)", re.I)
 _NO_UNIT = ("-", "--", "none", "1")
 #: Characters of the lines at the top in which the rows of numbers are searched.
 SEARCHED_TEXT = 1 << 20
@@ -84,6 +86,9 @@ class TableTop:
             )
             if grouped and over is not None:
                 names = [f"{g} {n}".strip() for g, n in zip(_filled(over), names, strict=True)]
+            over_names = near[1:2] or comments[-1:]
+            if not below and not grouped and over_names:
+                below = self._units_over(over_names[0], width, kinds)
             del self.above[len(self.above) - 1 - bool(below) - grouped - len(marks) :]
         count: Counter[str] = Counter()
         self.names = []
@@ -92,6 +97,16 @@ class TableTop:
             self.names.append(name if count[name] == 1 else f"{name} ({count[name]})")
         if below:
             self.units = {n: u for n, u in zip(self.names, below, strict=True) if u}
+
+    def _units_over(self, line: str, width: int, kinds: Sequence[str]) -> list[str] | None:
+        """Units in the line above the names, of any quantity: ``# deg, deg, ft msl, kt``.
+
+        The level of a height, which a name says, is left out.
+        """
+        bare = line.strip().lstrip(MARKS)
+        fields = [_LEVEL.sub(r"\1", field) for field in fields_of(bare, self.separator)]
+        joined = (self.separator or " ").join(fields)
+        return _units(joined, self.separator, width, tuple({*kinds, *OF_TABLES}))
 
     def _behind_a_word(self, line: str, width: int) -> list[str] | None:
         """Names of rows that all begin with one word, which has no name: ``Data,1,2``."""
@@ -315,8 +330,8 @@ def stated_units(above: list[str], columns: dict[str, NDArray[Any]]) -> dict[str
 def _counts(triad: str, text: str, of_16_bits: bool) -> str | None:
     """Return the unit of raw counts that a text states."""
     if triad == "accel" and (m := _ONE_G.match(text)) and float(m[1]):
-        scale, unit = f"/{m[1]}", "g"
-    elif m := _PER_UNIT.search(text):
+        return f"g/{m[1]}"
+    if m := _PER_UNIT.search(text):
         scale, unit = f"/{m[1]}", unit_of(m[2])
     elif m := _PER_COUNT.search(text):
         return f"{m[1]} {of}" if (of := unit_of(m[2])) in _KNOWN[triad] else None

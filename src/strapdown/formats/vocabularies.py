@@ -352,7 +352,11 @@ _GEODETIC: dict[str, Quantity] = {
         + _words("东向速度 東向速度 东速"),
         SPEEDS,
     ),
-    "VD": Quantity(_velocities("d", "down"), SPEEDS, _velocities("u", "up")),
+    "VD": Quantity(
+        _velocities("d", "down"),
+        SPEEDS,
+        (*_velocities("u", "up"), *_words("vspd verticalspeed vspeed climbrate rateofclimb")),
+    ),
 }
 TRAJECTORIES = Vocabulary(
     {
@@ -449,9 +453,9 @@ FIXES = Vocabulary(
         ),
         "speed": Quantity(
             _words(
-                "speed sog gspeed groundspeed locationspeed speedoverground geschwindigkeit "
-                "vitesse velocidad velocità velocita snelheid hastighet prędkość predkosc rychlost "
-                "brzina rapidez скорость 速度 车速 航速 속도"
+                "speed sog gspeed groundspeed locationspeed speedoverground gndspd spd "
+                "geschwindigkeit vitesse velocidad velocità velocita snelheid hastighet prędkość "
+                "predkosc rychlost brzina rapidez скорость 速度 车速 航速 속도"
             ),
             SPEEDS,
         ),
@@ -459,7 +463,8 @@ FIXES = Vocabulary(
         "course": Quantity(
             _words(
                 "course cog bearing courseoverground locationcourse track directionofmotion "
-                "gpsheading gnssheading headmot kurs rumbo rotta koers курс 航向 航向角"
+                "gpsheading gnssheading headmot trk gcrs groundcourse kurs rumbo rotta koers курс "
+                "航向 航向角"
             ),
             ANGLES,
         ),

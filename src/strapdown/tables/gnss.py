@@ -310,7 +310,7 @@ _CLIMBS = {
 }
 
 
-def _check_climb(source: str, time: Array, alt: Array, down: Array) -> None:
+def _check_climb(source: str | None, time: Array, alt: Array, down: Array) -> None:
     """Refuse heights, and velocities down, of another unit or sign, by how one follows the other.
 
     Heights are fitted by the integral of the velocity, a constant and a trend, in all and in each

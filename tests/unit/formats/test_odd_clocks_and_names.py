@@ -1,6 +1,7 @@
-"""Clocks and names of strangers' tables that were refused without need, against what was written.
+"""Clocks, names and units of strangers' tables that were refused, or read wrongly in silence.
 
-A body turns about three axes under gravity; its samples are written as each program has them.
+A body turns about three axes under gravity, and an aircraft climbs along a bend; both are written
+as each program has them, and what is read is compared with what was written.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from tests.coded import coded
 import strapdown as sd
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError
+from strapdown.frames import geodetic_from_ned
 from strapdown.sensors.imu_health import check_imu_channels
 from strapdown.tables import ACCEL, GYRO
 
@@ -61,6 +63,13 @@ CLOCKS += ['"aika, ms"', '"idő, ms"', '"zaman, ms"', '"시간, ms"', '"Zeit, ms
 def test_words_for_time_and_its_unit_in_other_languages(tmp_path, name):
     lines = [f"{round(1000 * t)},{body}" for t, body in zip(T, BODY, strict=True)]
     check(sd.read_imu(written(tmp_path, [",".join([name, *SI]), *lines])))
+
+
+def test_a_letter_beside_a_word_of_clocks(tmp_path):
+    lines = [f"{1.7e9 + t:.2f},{body}" for t, body in zip(T, BODY, strict=True)]
+    imu = sd.read_imu(written(tmp_path, [",".join(["t_unix", *SI]), *lines]))
+    check(imu)
+    assert imu.attrs["clock"] == "unix"
 
 
 def test_fractions_without_zeros(tmp_path):
@@ -183,6 +192,34 @@ def test_what_fixes_leave_open_is_asked_at_once():
     asked = [f.code for f in refused.value.finding.data["questions"]]
     assert asked == ["io.height-level-not-stated", "io.position-sd-not-stated"]
     assert len(sd.read_gnss(fixes, datum_height_m=0.0, position_sd_m=1.0)) == len(fixes)
+
+
+@pytest.mark.parametrize("marked", ["#", ""])
+def test_units_above_the_names_of_an_avionics_log(tmp_path, marked):
+    """Garmin G1000: units in a comment above the names; feet, knots and feet a minute."""
+    k = np.arange(300)
+    course, speed, up = 40.0 + 30.0 * np.sin(k / 40.0), 55.0, 3.0 * np.sin(k / 30.0)
+    ahead = np.column_stack([np.cos(np.radians(course)), np.sin(np.radians(course))])
+    v = np.column_stack([speed * ahead, -up])
+    way = np.vstack([np.zeros(3), np.cumsum(0.5 * (v[1:] + v[:-1]), axis=0)])
+    place = geodetic_from_ned(way, (48.0, 11.0, 900.0))
+    lines = [
+        '#airframe_info, log_version="1.00", airframe_name="Cessna 172S"',
+        f"{marked}yyy-mm-dd, hh:mm:ss, degrees, degrees, ft msl, deg C, kt, fpm, deg, deg",
+        "Lcl Date, Lcl Time, Latitude, Longitude, AltMSL, OAT, GndSpd, VSpd, Roll, TRK",
+    ]
+    for j in k:
+        lines.append(
+            f"2024-05-06, 09:{30 + j // 60:02d}:{j % 60:02d}, {place[j, 0]:.8f}, "
+            f"{place[j, 1]:.8f}, {place[j, 2] / 0.3048:.2f}, 10.0, {speed / 0.514444444:.4f}, "
+            f"{up[j] / 0.00508:.3f}, 1.0, {course[j]:.4f}"
+        )
+    path = written(tmp_path, lines)
+    asked = {"datum_height_m": 0.0, "position_sd_m": 3.0, "velocity_sd_m_per_s": 0.5}
+    fixes = sd.read_gnss(path, **asked)
+    np.testing.assert_allclose(fixes[["lat", "lon"]], place[:, :2], atol=1e-7)
+    np.testing.assert_allclose(fixes["alt"], place[:, 2], atol=0.01)
+    np.testing.assert_allclose(fixes[["VN", "VE", "VD"]], v, atol=1e-3)
 
 
 @pytest.mark.parametrize("clipped", [False, True])
