@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from strapdown.alignment.alignment import Site
 from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.gnss_course import GnssCourse
-from strapdown.alignment.inertial_frame import fit_inertially, heading_rate
+from strapdown.alignment.inertial_frame import InertialFrame, fit_inertially, heading_rate
 from strapdown.alignment.inertial_sums import sum_inertially
 from strapdown.config.logs import AxesTable, FixesTable, LogTable
 from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
@@ -87,6 +87,8 @@ TOGETHER = 5
 UNSEEN = 3.0
 #: Gyro bias that allows gyrocompassing, the rest needed for it, and the longest that is used, s.
 NORTH, LEAST_REST, LONGEST_REST = 2.0 / DEG_PER_HOUR, 60.0, 600.0
+#: Findings of a rest that does not give the heading.
+NO_NORTH = ("alignment.no-north", "alignment.no-north-near-pole")
 #: Grades by the noise of the quietest gyro, rad/s/√Hz: the best consumer part of the catalogue has
 #: 0.168 deg/√h, the best calibrated MEMS unit 0.1 deg/√h; a little less counts as the same.
 NOISE_OF_GRADES = (
@@ -94,9 +96,18 @@ NOISE_OF_GRADES = (
     ("industrial-grade", math.radians(0.13) / 60.0),
     ("consumer-grade", math.inf),
 )
-#: Scale factors of an unknown tactical unit follow its temperature, over the time in which it takes
-#: that of its surroundings: as constants an hour of good fixes makes them surer than they stay.
-SCALES = {"correlation_time_s": 3600.0}
+#: The grade above: of a noise below that of all tactical units (0.012 deg/√h of those with good
+#: fibre-optic gyros), whose rest shows a bias below theirs (1 deg/h, Groves 2013, Table 4.1). Noise
+#: alone does not show it: a filtered or simulated sensor may have any.
+FINEST, FINEST_NOISE, FINEST_BIAS = (
+    "intermediate-grade",
+    math.radians(0.01) / 60.0,
+    1.0 / DEG_PER_HOUR,
+)
+#: Scale factors of an unknown unit of these grades follow its temperature, over the time in which
+#: it takes that of its surroundings: as constants an hour of good fixes makes them surer than they
+#: stay.
+SCALED, SCALES = (FINEST, "tactical-grade"), {"correlation_time_s": 3600.0}
 #: Change of the biases of a grade while the unit warms up: gyros, deg/h, and accelerometers, µg.
 #: Data sheets state 0.005 to 0.05 deg/s/K and 0.1 to 1 mg/K for consumer parts (ICM-42688-P,
 #: LSM6DSO, BMI160), a third for industrial ones; assumed: a unit becomes 3 to 5 K warmer.
@@ -273,7 +284,7 @@ def propose(
         rocking = _rest(quiet, until, rocks=True)
         table["sensors"] = _sensors(sensor, scatter, _rest_bias(imu, rocking, place, fixes))
         sensors = _stated(table)
-        if table["sensors"]["sensor"] == "tactical-grade":
+        if table["sensors"]["sensor"] in SCALED:
             table["states"] = {name: dict(SCALES) for name in ("gyro_scale", "accel_scale")}
     rest = _rest(quiet, until, rocks=sensors is not None and _finds_north(sensors))
     span = float(imu.index[-1] - imu.index[0])
@@ -282,6 +293,14 @@ def propose(
     chosen, how = _alignment(
         sensors, rest, drives, heading_deg, span, levelled, velocities=bool(measured)
     )
+    if chosen["coarse"]["kind"] == "inertial_frame" and not (place is None and fixes is None):
+        assert sensors is not None  # or no rest would do
+        no_north = _no_north(imu, _site(place, fixes), sensors, chosen["coarse"]["duration_s"])
+        if no_north is not None:
+            findings = (*findings, no_north)
+            chosen, how = _alignment(
+                sensors, 0.0, drives, None, span, levelled, velocities=bool(measured)
+            )
     clock: dict[str, Any] = {}
     if fixes is not None:
         assert gnss is not None  # whence the fixes are
@@ -398,7 +417,10 @@ def _sensors(
     if named is None:
         del out["unit_factor"]
         assert scatter is not None
-        out["sensor"] = next(name for name, most in NOISE_OF_GRADES if min(scatter[0][0]) < most)
+        noise = float(min(scatter[0][0]))
+        out["sensor"] = next(name for name, most in NOISE_OF_GRADES if noise < most)
+        if bias is not None and bias < FINEST_BIAS and noise < FINEST_NOISE:
+            out["sensor"] = FINEST
     known = ImuUncertainty.of_sensor(load_sensor(out["sensor"]))
     # For gyrocompassing gyros the rocking of a vehicle is motion, not noise.
     north = _finds_north(known) or (named is None and bias is not None and bias <= NORTH)
@@ -451,11 +473,7 @@ def _rest_bias(
     """
     if rest < LEAST_REST or (place is None and fixes is None):
         return None
-    if place is None:
-        assert fixes is not None
-        lat, lon, alt = np.nanmedian(values_of(fixes, GEODETIC)[:10], axis=0).tolist()
-        place = (lat, lon, alt)
-    site = Site(*place)
+    site = _site(place, fixes)
     begin = float(imu.index[0])
     sums = sum_inertially(imu[imu.index <= begin + min(rest, LONGEST_REST)])
     fit = fit_inertially(sums, site)
@@ -463,6 +481,32 @@ def _rest_bias(
     # Of the horizontal rate w cos(lat), by the latitude that it seems to be.
     north = float(site.earth_rate[2]) * fit.latitude_change
     return math.hypot(vertical, north) / math.sqrt(-2.0 * math.log(0.95))
+
+
+def _site(place: tuple[float, float, float] | None, fixes: pd.DataFrame | None) -> Site:
+    """Site that is stated, or of the first fixes."""
+    if place is None:
+        assert fixes is not None
+        lat, lon, alt = np.nanmedian(values_of(fixes, GEODETIC)[:10], axis=0).tolist()
+        place = (lat, lon, alt)
+    return Site(*place)
+
+
+def _no_north(
+    imu: pd.DataFrame, site: Site, sensors: ImuUncertainty, length: float
+) -> Finding | None:
+    """Reason for which a rest of so many seconds does not give the heading, if it does not.
+
+    Biases that are small are not enough where the body vibrates, or where the sensors have other
+    errors at rest.
+    """
+    try:
+        InertialFrame("end").align(imu[imu.index <= imu.index[0] + length], site, sensors)
+    except DataError as error:
+        if error.finding.code not in NO_NORTH:
+            return None  # the run refuses what cannot be helped by another alignment
+        return error.finding
+    return None
 
 
 def _quiet(imu: pd.DataFrame, until: float) -> list[tuple[float, float]]:

@@ -53,6 +53,21 @@ def test_noise_tells_the_grade_and_is_stated():
         assert found["sensor"] == grade
 
 
+@pytest.mark.parametrize(
+    ("noise", "bias", "grade"),
+    [
+        (0.003, 0.3, "intermediate-grade"),
+        (0.003, None, "tactical-grade"),  # a filtered sensor has any noise
+        (0.003, 1.1, "tactical-grade"),  # Groves (2013), Table 4.1: from 1 deg/h on
+        (0.012, 0.3, "tactical-grade"),  # of good tactical units
+    ],
+)
+def test_a_quiet_unit_whose_rest_shows_no_bias_is_better_than_tactical(noise, bias, grade):
+    quiet = scatter(np.radians(noise) / 60.0, 50.0 / MICRO_G)
+    found = _sensors(None, quiet, None if bias is None else bias / DEG_PER_HOUR)
+    assert found["sensor"] == grade
+
+
 def test_noise_beyond_the_data_sheet_is_stated_for_a_named_sensor_too():
     # The HG9900 has accelerometers of 10 µg/√Hz and gyros of 0.002 deg/√h.
     gyro = np.radians(0.001) / 60.0
@@ -77,6 +92,16 @@ def test_the_industrial_grade_is_as_wide_as_the_units_it_stands_for():
         # As stated: two digits.
         stated = max(getattr(own, triad).axis(name))
         assert stated == pytest.approx(np.sqrt(np.mean(np.square(sds))), rel=0.05)
+
+
+def test_the_intermediate_grade_is_aligned_as_the_navigation_units_are():
+    own = ImuUncertainty.of_sensor(load_sensor("intermediate-grade"))
+    known = [ImuUncertainty.of_sensor(load_sensor(name)) for name in ("fog-1000", "hg9900")]
+    for triad in ("gyro", "accel"):
+        sds = [getattr(one, triad).axis("misalignment") for one in known]
+        # As stated: two digits.
+        stated = max(getattr(own, triad).axis("misalignment"))
+        assert stated == pytest.approx(np.sqrt(np.mean(np.square(sds))), rel=0.02)
 
 
 @pytest.mark.parametrize(
@@ -128,16 +153,13 @@ def test_a_short_rest_bounds_nothing():
     assert _rest_bias(imu, 59.0, PLACE, None) is None
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
-def test_quiet_sensors_with_large_slow_errors_follow_their_fixes(tmp_path, seed):
-    """Noise as that of a navigation unit, biases and scale factors of a tactical one.
+def quiet_drive(folder, seed, shaken=0.0, turns=6):
+    """A drive after a rest of 70 s: noise of a navigation unit, slow errors of a tactical one.
 
-    The nearest sensor of the catalogue by noise was taken: one of 10 µg/√Hz, 25 µg and 100 ppm for
-    one of 50 µg/√Hz, 300 µg and 500 ppm. With a receiver good to 1 cm the height ran away.
+    `shaken` (m/s² and deg/s): a vibration of 20 Hz, of which a mean leaves nothing.
     """
     legs = [("rest", Straight(70.0))]
-    for k in range(6):
+    for k in range(turns):
         legs += [
             (f"{k} faster", Accelerate(14.0, 6.0)),
             (f"{k} on", Straight(10.0)),
@@ -159,16 +181,37 @@ def test_quiet_sensors_with_large_slow_errors_follow_their_fixes(tmp_path, seed)
         ),
     )
     imu, _ = simulate_imu(motion, errors, rate=50.0, sampling="mean", seed=seed)
+    wave = np.sin(2.0 * np.pi * 20.3 * imu.index.to_numpy())[:, None]
+    imu[[*GYRO, *ACCEL]] += shaken * wave * np.repeat([np.radians(1.0), 1.0], 3)
     fixes = simulate_gnss(motion, GnssReceiver(**RECEIVER), seed=seed)
     names = [*(f"gyro_{a}_rad_s" for a in "xyz"), *(f"accel_{a}_m_s2" for a in "xyz")]
     log = imu[[*GYRO, *ACCEL]].set_axis(names, axis=1).rename_axis("time_s")
-    (tmp_path / "log.csv").write_text("# sampling: mean\n" + log.to_csv())
-    fixes.to_csv(tmp_path / "fixes.csv")
-    made = propose(
-        LogTable(path=str(tmp_path / "log.csv")),
+    (folder / "log.csv").write_text("# sampling: mean\n" + log.to_csv())
+    fixes.to_csv(folder / "fixes.csv")
+    return motion, propose(
+        LogTable(path=str(folder / "log.csv")),
         axes="forward-right-down",
-        gnss=FixesTable(path=str(tmp_path / "fixes.csv")),
+        gnss=FixesTable(path=str(folder / "fixes.csv")),
     )
+
+
+def test_a_rest_that_vibration_keeps_from_north_is_not_proposed(tmp_path):
+    """The bias is that of a navigation unit, so that north was proposed, and the run refused it."""
+    _, made = quiet_drive(tmp_path, 1, shaken=0.4, turns=2)
+    assert made.table["sensors"]["gyro"]["bias_sd_deg_per_h"] < 2.0
+    assert made.table["coarse"]["kind"] == "gnss_course"
+    assert "alignment.no-north" in {one.code for one in made.findings}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_quiet_sensors_with_large_slow_errors_follow_their_fixes(tmp_path, seed):
+    """Noise as that of a navigation unit, biases and scale factors of a tactical one.
+
+    The nearest sensor of the catalogue by noise was taken: one of 10 µg/√Hz, 25 µg and 100 ppm for
+    one of 50 µg/√Hz, 300 µg and 500 ppm. With a receiver good to 1 cm the height ran away.
+    """
+    motion, made = quiet_drive(tmp_path, seed)
     run = run_navigation(NavigationSpec.checked({"name": "drive", **made.table}))
     found = run.trajectory
     later = found[found.index > found.index[-1] - 60.0]
