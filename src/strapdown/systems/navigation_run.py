@@ -106,6 +106,8 @@ RECOVERIES = 4
 #: An estimated time offset, s, over which a run is repeated with it, and by how many of its
 #: standard deviations it differs from zero.
 CONTINUED, SURELY = 0.05, 3.0
+#: How often at most: by a second, states of sensors take a part of it, and each run finds the rest.
+STEPS_OF_OFFSET = 4
 #: A run is repeated with the offset that it found, known to so many of its standard deviations,
 #: where that is at most this part of what was assumed, and where the assumed one moves the vehicle,
 #: at the speed that is exceeded for a tenth of the time, by so many standard deviations of fixes.
@@ -183,14 +185,18 @@ def run_navigation(
     progress("aligning" if spec.start is None else "navigating", BEGUN)
     with said_of_file(*tables):
         run = drive(chain, source.imu, source.tables, recorder, show_mode)
+        by_offset: tuple[Finding, ...] = ()
+        for _ in range(STEPS_OF_OFFSET):
+            chain, by_step = _with_offsets(chain, run.smoothed or run.record)
+            if not by_step:
+                break
+            by_offset = by_step
+            run = drive(chain, source.imu, source.tables, recorder, show_mode)
         begun_with = chain
-        chain, by_offset = _with_offsets(chain, run.smoothed or run.record)
         if not by_offset and run.smoothed is None:
             chain, by_offset = _with_known_offsets(chain, run.record, source.tables)
-        else:
-            begun_with = chain
-        if by_offset:
-            run = drive(chain, source.imu, source.tables, recorder, show_mode)
+            if by_offset:
+                run = drive(chain, source.imu, source.tables, recorder, show_mode)
         chain, run, by_recovery = _recovered(
             chain,
             run,
