@@ -135,12 +135,16 @@ def test_the_filter_with_the_fitted_sensor_is_consistent(grade):
     assert low < total < high, total / len(SEEDS)
 
 
-def test_a_filter_that_takes_the_bias_for_constant_is_not(tmp_path):
-    """The test above can fail: without the random walk of its file the phone's errors exceed P."""
-    total = 0.0
+def test_a_filter_that_takes_the_bias_for_constant_is_surer_than_it_may_be(tmp_path):
+    """The test above sees the file: without the random walk of the phone each error is larger in P.
+
+    By chance all of them are in 1 of 256. Navigation adapts to innovations, so that even a tenth of
+    the noise gives 11 for the 9 of a consistent filter.
+    """
     for seed in SEEDS:
-        text = fitted("phone", seed).sensor_text().splitlines(keepends=True)
+        text = fitted("phone", seed).sensor_text()
         path = tmp_path / f"constant-{seed}.toml"
-        path.write_text("".join(line for line in text if not line.startswith("random_walk")))
-        total += nees_at_the_end("phone", seed, path)
-    assert total > chi2.ppf(1.0 - 5e-4, 9 * len(SEEDS)), total / len(SEEDS)
+        lines = text.splitlines(keepends=True)
+        path.write_text("".join(line for line in lines if not line.startswith("random_walk")))
+        whole = nees_at_the_end("phone", seed, fitted("phone", seed).sensor)
+        assert nees_at_the_end("phone", seed, path) > whole
