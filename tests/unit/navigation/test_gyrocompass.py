@@ -119,10 +119,16 @@ def test_a_wrong_latitude_takes_the_witness_away():
 
 @pytest.mark.slow
 def test_a_wrong_stored_heading_is_not_green_while_it_is_wrong():
-    light, error = errors(run_navigation(spec_of(heading=9.0)))
+    light, error = errors(run_navigation(spec_of(sensor="hg1700", heading=9.0)))
     wrong = np.abs(error) > LIMIT
     assert wrong.sum() > 5
     assert not (wrong & (light == 0)).any()
+
+
+@pytest.mark.slow
+def test_gyros_that_find_north_correct_a_wrong_stored_heading():
+    light, error = errors(run_navigation(spec_of(heading=9.0)))
+    assert np.abs(error).max() < LIMIT
     # The rest at its begin is a compass, though nothing was aligned.
     assert (light == 0).any()
 
