@@ -37,9 +37,13 @@ def result(request, recordings):
         gnss=FixesTable(path=str(folder / "part1_gnss_rtk.csv")),
         sensor=request.param,
     )
-    table = {"name": "drive", **made.table, "smoother": "rts"}
-    table["aiding"]["wheels"] = {"kind": "no_slip", "mounting_sd_deg": (6.0, 6.0)}
-    return made, run_navigation(NavigationSpec.checked(table))
+    made.table["aiding"]["wheels"] = {"kind": "no_slip", "mounting_sd_deg": (6.0, 6.0)}
+    return made, navigated(made, kind="rts")
+
+
+def navigated(made, **smoother):
+    table = {"name": "drive", **made.table, "smoother": smoother}
+    return run_navigation(NavigationSpec.checked(table))
 
 
 def slopes(fixes):
@@ -74,8 +78,12 @@ def test_the_pitch_is_that_of_the_road_within_its_bound(result):
     assert made.table["aiding"]["gnss"]["time_offset_drift_s_per_sqrt_s"] > 0.0
 
 
-def test_later_fixes_bear_out_what_the_filter_told(result):
-    made, run = result
+def test_later_fixes_confirm_the_bounds_of_the_filter(result):
+    made, _ = result
+    # Filter and smoother of one linearization. A pass about the smoothed states moves the vertical
+    # arm, and with it the height throughout, by 1.5 cm: two thirds of their standard deviations,
+    # which filter and smoother have in common, and more than is left of their difference.
+    run = navigated(made, kind="rts", passes=1)
     # A receiver's error lasts: instants at which the car has not moved off are of one and the same
     # (0.05 m here, from ambiguities that are fixed anew on the way), no evidence for each of them.
     moves = made.gnss.index[made.gnss["VN"].abs() > 0.5][0]
