@@ -322,7 +322,8 @@ def separation_chart(evaluation: NavigationEvaluation) -> Chart | None:
         "separation",
         "Separation of filter and smoother",
         "Filter − smoothed position. The separation exceeds its band where later measurements "
-        "contradict the filter by more than it states.",
+        "contradict the filter by more than it states, or where the smoother's passes about its "
+        "own states correct the linearization.",
         panels,
     )
 
@@ -357,7 +358,7 @@ def smoothing_table(evaluation: NavigationEvaluation) -> TableBlock | None:
         "95 % bounds, medians over the run"
         + ("" if errors is None else "; RMS errors against the truth")
         + ". Consistent: share of the differences within three standard deviations by both "
-        "covariances (99.7 % for a correct model).",
+        "covariances (99.7 % for a correct model of one linearization).",
         strong=(k for k in range(len(rows)) if _apart(agreement, k)),
     )
 
