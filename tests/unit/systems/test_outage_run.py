@@ -179,7 +179,14 @@ def drawn(spec, known, runs):
     out = np.empty((runs, 3))
     for run in range(runs):
         draws = np.random.default_rng([run, 9])
-        gyro = apply(unit(known, "gyro", spec, draws), time, rate, sampling="mean", seed=2 * run)
+        gyro = apply(
+            unit(known, "gyro", spec, draws),
+            time,
+            rate,
+            sampling="mean",
+            seed=2 * run,
+            specific_force=force,
+        )
         accel = apply(
             unit(known, "accel", spec, draws), time, force, sampling="mean", seed=2 * run + 1
         )
@@ -201,6 +208,7 @@ def unit(known, triad, spec, draws):
         left = spec.start.accel_bias_sd_ug / MICRO_G
     cross = draws.standard_normal((3, 3)) * np.array(stated_sd.axis("misalignment"))[:, None]
     np.fill_diagonal(cross, 0.0)
+    by_force = draws.standard_normal((3, 3)) * np.array(stated_sd.axis("g_sensitivity"))[:, None]
     return TriadErrors(
         noise_density=stated_sd.axis("noise_density"),
         bias=tuple(left * draws.standard_normal(3)),
@@ -208,6 +216,7 @@ def unit(known, triad, spec, draws):
         correlation_time=drift.correlation_time,
         scale=tuple(np.array(stated_sd.axis("scale")) * draws.standard_normal(3)),
         misalignment=tuple(tuple(row) for row in cross.tolist()),
+        g_sensitivity=tuple(tuple(row) for row in by_force.tolist()),
     )
 
 
