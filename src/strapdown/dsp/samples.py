@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,6 +41,26 @@ def noise_free(values: Array) -> bool:
     second = np.diff(values, n=2, axis=0)
     fourth = np.diff(second, n=2, axis=0)
     return bool((np.square(fourth).mean(axis=0) <= np.square(second).mean(axis=0)).all())
+
+
+def constant_beside_noise(
+    channels: Sequence[Array], fewest: int, some: int | None = None
+) -> list[bool]:
+    """Whether each channel, (n,), never changes, beside others that have the noise of a sensor.
+
+    Parameters
+    ----------
+    fewest : int
+        Samples of a channel; fewer may be alike by chance.
+    some : int, optional
+        So many at the beginning show whether the others have noise; by default all.
+    """
+    constant = [
+        c.size >= fewest and bool((c[:some] == c[0]).all() and (c == c[0]).all()) for c in channels
+    ]
+    others = [c for c, same in zip(channels, constant, strict=True) if not same]
+    noisy = not all(noise_free(c[:some, None]) for c in others)
+    return constant if noisy else [False] * len(constant)
 
 
 def as_channels(values: ArrayLike, quantity: str = "values") -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.dsp.samples import noise_free
+from strapdown.dsp.samples import constant_beside_noise
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.arrays import as_rows, epoch_of, numbers, open_dates, ticks_of
 from strapdown.formats.clocks import (
@@ -904,14 +904,8 @@ def _report_constant(log: LogInUse, body: Mapping[str, Array], axis: Sequence[in
     for triad in ("gyro", "accel"):
         if triad not in body:
             continue
-        channels = body[triad].T
-        if channels[0].size < LASTING:
-            continue
-        constant = [bool((c[:SOME] == c[0]).all() and (c == c[0]).all()) for c in channels]
-        if not any(constant) or all(constant):
-            continue
-        if noise_free(np.column_stack([c[:SOME] for c in channels])):
-            continue
+        channels = list(body[triad].T)
+        constant = constant_beside_noise(channels, LASTING, SOME)
         for k in np.flatnonzero(constant).tolist():
             log.warn(
                 "io.channel-constant",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.dsp.samples import noise_free
+from strapdown.dsp.samples import constant_beside_noise
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord, refuse_impossible
@@ -249,10 +249,7 @@ FEWEST = 10
 def _report_constant(parts: list[_Axis], findings: list[Finding]) -> None:
     """Warn of a channel that never changes beside others that have the noise of a sensor."""
     values = [p.values[np.isfinite(p.values)] for p in parts]
-    constant = [v.size >= FEWEST and bool((v == v[0]).all()) for v in values]
-    others = [v for v, same in zip(values, constant, strict=True) if not same]
-    if len(others) == len(parts) or all(noise_free(v[:, None]) for v in others):
-        return
+    constant = constant_beside_noise(values, FEWEST)
     for part, samples, same in zip(parts, values, constant, strict=True):
         if same:
             add_warning(

@@ -141,30 +141,16 @@ def turn_ratio(
     slow one is noisier (`SLIPS`). The standard deviation is by each window's residual from the fit
     to the others (HC3 of MacKinnon and White 1985), as one turn may decide.
     """
-    told = courses(gnss, velocity_delay, COURSE_STEP)
-    stamps = index_of(imu)
-    force = np.array([float(one.mean()) for one in channels_of(imu, ACCEL)])
-    size = float(np.linalg.norm(force))
-    if told is None or not GRAVITY[0] < size < GRAVITY[1]:
+    driven = _driven(gnss, imu, velocity_delay, WINDOW)
+    if driven is None:
         return None
-    at, velocity = told
-    course = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
-    nodes, sums = integrals(stamps, imu, GYRO, imu.attrs["sampling"] == "mean")
-    turned = np.interp(at, nodes, sums @ (-force / size))
-    speed = np.hypot(*velocity.T)
-    first, last = _windows(at, speed, stamps, WINDOW)
-    if len(first) < LEAST_WINDOWS:
-        return None
+    at, speed, course, down, (first, last) = driven
+    nodes, sums = integrals(index_of(imu), imu, GYRO, imu.attrs["sampling"] == "mean")
+    turned = np.interp(at, nodes, sums @ down)
     weight = 1.0 / np.sqrt(speed[first] ** -2 + speed[last] ** -2 + SLIPS**-2)
     change = weight * (course[last] - course[first])
     X = weight[:, None] * np.column_stack([turned[last] - turned[first], at[last] - at[first]])
-    kept = np.ones(len(change), dtype=bool)
-    for _ in range(10):
-        fit, *_ = np.linalg.lstsq(X[kept], change[kept], rcond=None)
-        left = np.abs(change - X @ fit)
-        before, kept = kept, left <= GROSS * MAD_TO_SD * float(np.median(left[kept]))
-        if np.array_equal(before, kept):
-            break
+    fit, left, kept = _fit(X, change, GROSS * MAD_TO_SD)
     X, change, left = X[kept], change[kept], left[kept]
     if len(change) < max(LEAST_WINDOWS, COUNT * len(kept)):
         return None
@@ -177,6 +163,43 @@ def turn_ratio(
     if share < LEAST_SHARE or abs(slope) <= SIGNIFICANT * sd:
         return None
     return TurnRatio(1.0 / slope, sd / slope**2, share, len(change))
+
+
+def _driven(
+    gnss: pd.DataFrame, imu: pd.DataFrame, velocity_delay: float, length: float
+) -> tuple[Array, Array, Array, Array, NDArray[np.int64]] | None:
+    """Return what turns and accelerations of a drive are compared with, in windows of a length, s.
+
+    Times, speeds and courses, each (n,), in s, m/s and rad; down in body axes, (3,); and the first
+    and last number of each window, (2, m). None without gravity or with too few windows.
+    """
+    told = courses(gnss, velocity_delay, COURSE_STEP)
+    if told is None or ACCEL[0] not in imu.columns:
+        return None
+    at, velocity = told
+    speed = np.hypot(*velocity.T)
+    windows = _windows(at, speed, index_of(imu), length)
+    force = np.array([float(one.mean()) for one in channels_of(imu, ACCEL)])
+    size = float(np.linalg.norm(force))
+    if windows.shape[1] < LEAST_WINDOWS or not GRAVITY[0] < size < GRAVITY[1]:
+        return None
+    course = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
+    return at, speed, course, -force / size, windows
+
+
+def _fit(X: NDArray[Any], y: NDArray[Any], gross: float) -> tuple[NDArray[Any], Array, Array]:
+    """Fit by least squares without residuals of more than `gross` times the median.
+
+    Returns the fit, the size of all residuals, and which are kept.
+    """
+    kept = np.ones(len(y), dtype=bool)
+    for _ in range(10):
+        fit, *_ = np.linalg.lstsq(X[kept], y[kept], rcond=None)
+        left = np.abs(y - X @ fit)
+        before, kept = kept, left <= gross * float(np.median(left[kept]))
+        if np.array_equal(before, kept):
+            break
+    return fit, left, kept
 
 
 def _windows(at: Array, speed: Array, stamps: Array, length: float) -> NDArray[np.int64]:
@@ -219,36 +242,22 @@ def forward_direction(
     course. As complex numbers they differ by one factor, whose angle is that of the mounting; the
     tilt of the mean specific force is a second unknown.
     """
-    told = courses(gnss, velocity_delay, COURSE_STEP)
-    if told is None or ACCEL[0] not in imu.columns:
+    driven = _driven(gnss, imu, velocity_delay, CHANGE)
+    if driven is None:
         return None
-    at, velocity = told
-    stamps, speed = index_of(imu), np.hypot(*velocity.T)
-    first, last = _windows(at, speed, stamps, CHANGE)
-    force = np.array([float(one.mean()) for one in channels_of(imu, ACCEL)])
-    size = float(np.linalg.norm(force))
-    if len(first) < LEAST_WINDOWS or not GRAVITY[0] < size < GRAVITY[1]:
-        return None
-    down = -force / size
+    at, speed, course, down, (first, last) = driven
     across = np.eye(3)[np.abs(down).argmin()]
     across -= down * (across @ down)
     across /= np.linalg.norm(across)
-    course = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
     sideways = np.append(0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(course)))
     change = (speed + 1j * sideways)[last] - (speed + 1j * sideways)[first]
-    nodes, sums = integrals(stamps, imu, ACCEL, imu.attrs["sampling"] == "mean")
+    nodes, sums = integrals(index_of(imu), imu, ACCEL, imu.attrs["sampling"] == "mean")
     gained = np.interp(at, nodes, sums @ across) + 1j * np.interp(
         at, nodes, sums @ np.cross(down, across)
     )
     gained = gained[last] - gained[first]
     X = np.column_stack([change, at[last] - at[first]])
-    kept = np.ones(len(change), dtype=bool)
-    for _ in range(10):
-        fit, *_ = np.linalg.lstsq(X[kept], gained[kept], rcond=None)
-        left = np.abs(gained - X @ fit)
-        before, kept = kept, left <= GROSS * float(np.median(left[kept]))
-        if np.array_equal(before, kept):
-            break
+    fit, left, kept = _fit(X, gained, GROSS)
     if kept.sum() < max(LEAST_WINDOWS, COUNT * len(kept)):
         return None
     X, gained, left = X[kept], gained[kept], left[kept]
