@@ -58,8 +58,10 @@ def constant_beside_noise(
     constant = [
         c.size >= fewest and bool((c[:some] == c[0]).all() and (c == c[0]).all()) for c in channels
     ]
+    if not any(constant):
+        return constant
     others = [c for c, same in zip(channels, constant, strict=True) if not same]
-    noisy = not all(noise_free(c[:some, None]) for c in others)
+    noisy = any(c.size >= fewest and not noise_free(c[:some, None]) for c in others)
     return constant if noisy else [False] * len(constant)
 
 
