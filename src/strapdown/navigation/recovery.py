@@ -11,13 +11,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown import rotation
+from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
 from strapdown.estimation.robust import DOUBT, FEW, Igg3
 from strapdown.frames import place_difference
-from strapdown.navigation.measurements.gnss import PLACE, SPEED
-from strapdown.navigation.record import innovation_labels
-from strapdown.tables import GEODETIC
+from strapdown.navigation.measurements.gnss import PLACE, SPEED, Gnss
+from strapdown.navigation.record import NavigationRecord, innovation_labels
+from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY
 from strapdown.tables.checks import Array, index_of, values_of
+from strapdown.tables.gnss import usable
 
 #: Parts of a stretch after which its noise is told of.
 PARTS = 20
@@ -27,6 +29,12 @@ REJECTED = Igg3().k1
 SWING = 3.0
 #: A receiver that goes no farther than this part of the contradiction stands.
 STANDS = 0.1
+#: Neighbors on each side, whose median is what steps between fixes have in common: the error of the
+#: velocity. A jump is beyond so many standard deviations of a step, by the scatter of all and by
+#: those stated.
+BESIDE, JUMPED, STATED = 5, 6.0, 5.0
+#: Displaced positions that follow each other; fewer are gross errors.
+FEWEST = 3
 #: Velocities that together show whether a position changed as they say, and part of the change.
 TOGETHER, CONFIRMS = 3, 0.3
 
@@ -117,6 +125,68 @@ def wrong_stretches(
                 ):
                     found.append(one)
     return tuple(sorted(found, key=lambda one: one.begin))
+
+
+def displaced_stretches(
+    record: NavigationRecord, table: pd.DataFrame, aid: Gnss
+) -> tuple[tuple[float, float, float], ...]:
+    """Return stretches of positions that jump away and back by the same, as `Gnss.displaced`.
+
+    What a position moved from one fix to the next beyond the velocity of the solution is a jump of
+    the receiver: a solution that is wrong swings by degrees. Between two opposite jumps positions
+    are displaced by a constant; the longer part of the record is taken for what is not. A jump and
+    the next one back are a gross error of one fix, which the update rule rejects.
+
+    Parameters
+    ----------
+    record : NavigationRecord
+        Of a run over the fixes.
+    table : DataFrame
+        Gnss table.
+    aid : Gnss
+        Receiver.
+    """
+    own = record.trajectory
+    at = index_of(table) - aid.time_offset
+    used = usable(table, POSITION_SD) & np.isin(table["quality"], aid.qualities)
+    rows = np.flatnonzero(used & (at >= own.index[0]) & (at <= own.index[-1]))
+    if len(rows) < 4 * BESIDE or not aid.use_position:
+        return ()
+    place = values_of(table, GEODETIC)[rows]
+    steps = place_difference(place[1:], place[:-1])
+    steps = steps - np.diff(_way(own, at[rows], np.asarray(aid.lever_arm)), axis=0)
+    around = np.pad(steps, ((BESIDE, BESIDE), (0, 0)), mode="reflect")
+    around = np.lib.stride_tricks.sliding_window_view(around, 2 * BESIDE + 1, axis=0)
+    steps = steps - np.median(around, axis=-1)
+    sd = aid.position_sd_factor * values_of(table, POSITION_SD)[rows]
+    scatter = MAD_TO_SD * np.median(np.abs(steps), axis=0)
+    allowed = np.maximum(JUMPED * scatter, STATED * np.hypot(sd[1:], sd[:-1]))
+    stamps, found, away = index_of(table)[rows], list[tuple[float, float, float]](), list[int]()
+    for back in np.flatnonzero((np.abs(steps) > allowed).any(axis=1)).tolist():
+        # Jumps are matched as brackets are: gross errors within a stretch, and stretches apart.
+        first = away[-1] if away else back
+        left = np.abs(steps[first] + steps[back])
+        if (left > math.sqrt(2.0) * np.maximum(allowed[first], allowed[back])).any():
+            away.append(back)
+            continue
+        away.pop()
+        if back - first >= FEWEST:
+            begin, end = (float(0.5 * (stamps[k] + stamps[k + 1])) for k in (first, back))
+            size = float(np.linalg.norm(0.5 * (steps[first] - steps[back])))
+            found = [one for one in found if one[1] < begin] + [(begin, end, size)]
+    if sum(end - begin for begin, end, _ in found) > 0.5 * (stamps[-1] - stamps[0]):
+        return ()
+    return tuple(found)
+
+
+def _way(trajectory: pd.DataFrame, at: Array, arm: Array) -> Array:
+    """Way of an antenna at instants by the velocity of a solution, north, east, down, (n, 3), m."""
+    time, velocity = index_of(trajectory), values_of(trajectory, VELOCITY)
+    mean = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time)[:, None]
+    way = np.concatenate([np.zeros((1, 3)), np.cumsum(mean, axis=0)])
+    q = rotation.quaternion_from_euler(values_of(trajectory, EULER))
+    way += rotation.rotate(q, arm)
+    return np.column_stack([np.interp(at, time, way[:, k]) for k in range(3)])
 
 
 def longest(stretches: tuple[Wrong, ...]) -> float:

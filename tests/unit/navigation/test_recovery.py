@@ -14,10 +14,16 @@ from strapdown.frames import geodetic_from_ned
 from strapdown.navigation.measurements.gnss import PLACE
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.recorder import FullRecorder
-from strapdown.navigation.recovery import PARTS, Wrong, longest, wrong_stretches
+from strapdown.navigation.recovery import (
+    PARTS,
+    Wrong,
+    displaced_stretches,
+    longest,
+    wrong_stretches,
+)
 from strapdown.navigation.replay import PipelineRun
 from strapdown.navigation.smoother import RauchTungStriebel
-from strapdown.systems.navigation_run import _recovered
+from strapdown.systems.navigation_run import _recovered, _without_displacements
 from strapdown.tables import GEODETIC, VELOCITY, VELOCITY_SD
 
 RULE = AdaptiveRule(Igg3(), AdaptiveScale(lowest=1.0))
@@ -47,11 +53,11 @@ def pushed(push=0.0, turn=0.0, begin=50.0, end=58.0):
     return time, rows
 
 
-def navigated(table, samples, smoother=None, asked=None):
+def navigated(table, samples, smoother=None, asked=None, step=_recovered):
     """The run as its pipeline would have it, repeated where it is contradicted."""
 
     def drive(chain):
-        _, state = town.begun(town.gnss(rule=RULE))
+        _, state = town.begun(*chain.navigator.aids)
         navigator = chain.navigator
         state = navigator.tell(state, "gnss", table)
         state, piece = navigator.advance(state, *samples)
@@ -67,7 +73,7 @@ def navigated(table, samples, smoother=None, asked=None):
     navigator, _ = town.begun(town.gnss(rule=RULE))
     chain = SimpleChain(replace(navigator, smoother=smoother))
     first = drive(chain)
-    return first, _recovered(chain, first, {"gnss": table}, drive if asked is None else asked)
+    return first, step(chain, first, {"gnss": table}, drive if asked is None else asked)
 
 
 def off(record):
@@ -230,3 +236,88 @@ def test_a_short_contradiction_is_left_to_the_rule():
     assert wrong_stretches(first.record.innovations, {"gnss": table})
     assert run is first
     assert findings == ()
+
+
+FAULT = np.array([20.0, -15.0, 8.0])
+
+
+def displaced(*stretches, sd=0.05, seed=5):
+    """Positions without velocities, of which those of each stretch are displaced by its fault."""
+    table = town.fixes(seed, position_noise=sd)
+    table[VELOCITY], table[VELOCITY_SD] = 0.0, np.inf
+    for begin, end, fault in stretches:
+        bad = (table.index > begin) & (table.index < end)
+        own = [geodetic_from_ned(fault, place) for place in table.loc[bad, GEODETIC].to_numpy()]
+        table.loc[bad, GEODETIC] = own
+    return table
+
+
+@pytest.mark.parametrize("smoother", [None, RauchTungStriebel()])
+def test_positions_that_jump_away_and_back_do_not_pull_the_solution(smoother):
+    """Forty seconds beside by 26 m, and another stretch of another size, with positions alone."""
+    table = displaced((40.0, 80.0, FAULT), (120.0, 130.0, -0.4 * FAULT))
+    first, (chain, run, (finding,)) = navigated(
+        table, pushed(), smoother, step=_without_displacements
+    )
+    assert finding.code == "navigation.run-again-with-displacement"
+    one, other = chain.navigator.aids[0].displaced
+    # Between two fixes, which are half a second apart.
+    np.testing.assert_allclose([*one[:2], *other[:2]], [40.0, 80.0, 120.0, 130.0], atol=0.26)
+    np.testing.assert_allclose([one[2], other[2]], np.linalg.norm(FAULT) * np.r_[1, 0.4], rtol=0.02)
+    for record in (run.record, run.smoothed or run.record):
+        distance, bounds = off(record)
+        assert distance.max() < 0.1 * off(first.record)[0].max()
+        assert bounds.max() < 4.0
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_displacement_of_a_stretch_is_estimated_with_its_error(seed):
+    """At the end of each stretch: the error within 4 standard deviations, these below a fix's."""
+    table = displaced((40.0, 60.0, FAULT), (90.0, 110.0, -0.8 * FAULT), sd=1.0, seed=100 + seed)
+    _, (_, run, _) = navigated(table, pushed(), step=_without_displacements)
+    names = [f"gnss.displacement_{axis}" for axis in ("north", "east", "down")]
+    for end, true in ((59.9, FAULT), (109.9, -0.8 * FAULT)):
+        at = run.record.sensors.index.searchsorted(end)
+        found, sd = (
+            of[names].iloc[at].to_numpy() for of in (run.record.sensors, run.record.sensors_sd)
+        )
+        assert (np.abs(found - true) < 4.0 * sd).all()
+        assert (sd < 1.0).all()
+
+
+def test_fixes_without_such_a_stretch_are_left_alone():
+    """Of sound ones, of gross errors of one or two, and where most of the record is displaced."""
+    run = navigated(displaced(), pushed(), step=_without_displacements)[0]
+    for seed in range(30):
+        assert displaced_stretches(run.record, displaced(seed=seed), town.gnss()) == ()
+    for table in (
+        displaced((40.0, 40.6, FAULT), (60.0, 61.0, FAULT)),
+        displaced((20.0, 145.0, FAULT)),
+        displaced((40.0, 200.0, FAULT)),
+        displaced((40.0, 60.1, FAULT), (60.1, 80.0, 0.5 * FAULT)),
+        displaced((40.0, 80.0, 0.01 * FAULT)),
+    ):
+        assert displaced_stretches(run.record, table, town.gnss()) == ()
+
+
+def test_between_two_displaced_stretches_positions_are_sound():
+    """Also with a gross error of one fix within the first."""
+    run = navigated(displaced(), pushed(), step=_without_displacements)[0]
+    table = displaced((40.0, 60.0, FAULT), (50.0, 50.6, -3.0 * FAULT), (70.0, 90.0, FAULT))
+    found = displaced_stretches(run.record, table, town.gnss())
+    np.testing.assert_allclose([one[0] for one in found], [40.0, 70.0], atol=0.26)
+
+
+def test_positions_that_are_displaced_any_cut_gives_the_same_bits():
+    table, found = displaced((20.0, 31.0, FAULT), (40.0, 60.0, FAULT)), []
+    for sizes in ([10**6], [7, 50, 3]):
+        aid = town.gnss(rule=RULE, displaced=((20.0, 31.0, 30.0), (40.0, 60.0, 30.0)))
+        navigator, state = town.begun(aid)
+        time, rows = town.increments()
+        state, at, k = navigator.tell(state, "gnss", table), 0, 0
+        while at < 4000:
+            end = min(at + sizes[k % len(sizes)], 4000)
+            state, _ = navigator.advance(state, time[at:end], rows[at:end])
+            at, k = end, k + 1
+        found.append(state.engine.filter.covariance)
+    np.testing.assert_array_equal(*found)
