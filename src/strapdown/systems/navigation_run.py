@@ -462,7 +462,7 @@ def _without_displacements(
     for aid in chain.navigator.aids:
         if not isinstance(aid, Gnss) or aid.displaced:
             continue
-        found = displaced_stretches(run.record, tables[aid.name], aid)
+        found, size = displaced_stretches(run.record, tables[aid.name], aid)
         if not found:
             continue
         other = _with_aid(chain, replace(aid, displaced=found))
@@ -483,7 +483,7 @@ def _without_displacements(
                 count=len(found),
                 begin=found[0][0],
                 end=found[0][1],
-                size=max(size for _, _, size in found),
+                size=size,
                 given=str([[round(x, 3) for x in one] for one in found]),
             ),
         )

@@ -46,6 +46,8 @@ LASTING = 100.0
 #: Share of the variance of a float solution that lasts, and how long, s: wrong ambiguities are the
 #: same from fix to fix until the receiver loses a signal.
 FLOAT_SHARE, FLOAT_LASTING = 0.9, 30.0
+#: Standard deviation of a displacement of positions before any of them, m: reflections in a town.
+DISPLACEMENT_SD = 100.0
 #: A velocity or acceleration is clear of its error from so many of its standard deviations.
 CLEAR = 3.0
 TINY = 1e-300
@@ -101,10 +103,10 @@ class Gnss(TabulatedMeasurement):
         float solution, whose carrier-phase ambiguities are not integers. Its errors are not those
         of fixed solutions in another size, and most of them last: states ``NAME.float_error``, in
         standard deviations of `FLOAT_SHARE`, for `FLOAT_LASTING`. Zero: none is.
-    displaced : tuple of triples of float, s, s, m
+    displaced : tuple of pairs of float, s
         Stretches of stamps, from the first to before the second, whose positions are all displaced
-        by the same, and the standard deviation of that: wrong ambiguities, or a reflection. It is
-        estimated: states ``NAME.displacement``, north, east, down.
+        by the same: wrong ambiguities, or a reflection. By how much is estimated: states
+        ``NAME.displacement``, north, east, down, `DISPLACEMENT_SD` for each stretch.
     position_sd_factor, velocity_sd_factor : float
         Factors on the stated standard deviations.
     least_position_sd, least_velocity_sd : float, m and m/s
@@ -129,7 +131,7 @@ class Gnss(TabulatedMeasurement):
     position_correlated_share: float = 0.0
     position_correlation_time: float = _in("s", LASTING)
     float_position_sd: float = _in("m")
-    displaced: tuple[tuple[float, float, float], ...] = ()
+    displaced: tuple[tuple[float, float], ...] = field(default=(), metadata={"unit": "s"})
     use_position: bool = True
     use_velocity: bool = True
     position_sd_factor: float = 1.0
@@ -178,7 +180,7 @@ class Gnss(TabulatedMeasurement):
                 raise ConfigError("navigation.clock-unsure-sd", quantity="clock_unsure", sd=sd)
         if self.clock_unsure and not self.time_offset_sd:
             raise ConfigError("navigation.time-offset-walks-not-estimated", quantity="clock_unsure")
-        if not all(a < b and 0.0 < sd < math.inf for a, b, sd in self.displaced):
+        if not all(begin < end for begin, end in self.displaced):
             raise ConfigError(
                 "navigation.displaced-not-stretches", quantity="displaced", given=self.displaced
             )
@@ -199,14 +201,15 @@ class Gnss(TabulatedMeasurement):
             lasting = unseen("float_error", ("north", "east", "down"), "1", 1.0)
             out.append(gauss_markov(lasting.named(self._float), FLOAT_LASTING))
         if self.displaced:
-            axes, size = ("north", "east", "down"), self.displaced[0][2]
-            out.append(unseen("displacement", axes, "m", size).named(self._displacement))
+            axes = ("north", "east", "down")
+            beside = unseen("displacement", axes, "m", DISPLACEMENT_SD)
+            out.append(beside.named(self._displacement))
         return tuple(out)
 
     def forgotten(self, since: float, until: float) -> list[tuple[str, float]]:
         """Return what changes at an instant: the time offset, and what displaces positions."""
         steps = [(self._offset, stamp, sd) for stamp, sd in self.clock_unsure]
-        steps += [(self._displacement, stamp, sd) for stamp, _, sd in self.displaced[1:]]
+        steps += [(self._displacement, stamp, DISPLACEMENT_SD) for stamp, _ in self.displaced[1:]]
         return [
             (name, sd) for name, stamp, sd in steps if since < stamp - self.time_offset <= until
         ]
@@ -266,7 +269,7 @@ class Gnss(TabulatedMeasurement):
             codes = np.full(len(value), code)
             if code == POSITION_CODE:
                 value = np.column_stack([np.radians(value[:, :2]), value[:, 2]])
-                for begin, end, _ in self.displaced:
+                for begin, end in self.displaced:
                     codes[(index_of(table) >= begin) & (index_of(table) < end)] = DISPLACED_CODE
             elif used:
                 # Many receivers output speed and course only.
