@@ -480,10 +480,8 @@ def _without_displacements(
                 severity="warning",
                 file=source_of(tables[aid.name]),
                 quantity="lat, lon, alt",
-                count=len(found),
-                begin=found[0][0],
-                end=found[0][1],
                 size=size,
+                listed=[f"{begin:.5g} to {end:.5g} s" for begin, end in found],
                 given=str([[round(x, 3) for x in one] for one in found]),
             ),
         )
