@@ -178,9 +178,9 @@ def displaced_stretches(
     size = 0.0
     for back in np.flatnonzero((np.abs(steps) > allowed).any(axis=1)).tolist():
         # Jumps are matched as brackets are: gross errors within a stretch, and stretches apart.
-        left, own = steps[away] + steps[back], np.linalg.norm(steps[back])
+        left, jump = steps[away] + steps[back], np.linalg.norm(steps[back])
         reach = math.sqrt(2.0) * np.maximum(allowed[away], allowed[back])
-        matched = (np.abs(left) < reach).all(axis=1) & (np.linalg.norm(left, axis=1) < ALIKE * own)
+        matched = (np.abs(left) < reach).all(axis=1) & (np.linalg.norm(left, axis=1) < ALIKE * jump)
         if not matched.any():
             away.append(back)
             continue
@@ -233,7 +233,8 @@ def _slip(record: NavigationRecord, at: Array, arm: float) -> Array:
     slip = values_of(record.sd, VELOCITY) * float(np.median(np.diff(at)))
     turned = np.radians(np.linalg.norm(values_of(record.sd, EULER), axis=1))
     slip = np.hypot(slip, arm * turned[:, None])
-    return slip[np.clip(index_of(record.sd).searchsorted(at[1:]), 0, len(slip) - 1)]
+    rows = np.clip(index_of(record.sd).searchsorted(at[1:]), 0, len(slip) - 1)
+    return np.asarray(slip[rows])
 
 
 def longest(stretches: tuple[Wrong, ...]) -> float:
