@@ -34,8 +34,9 @@ STANDS = 0.1
 #: velocity. A jump is beyond so many standard deviations of a step, by the scatter of all and by
 #: those stated.
 BESIDE, JUMPED, STATED = 5, 6.0, 5.0
-#: Displaced positions that follow each other; fewer are gross errors.
-FEWEST = 3
+#: Steps on each side that are no jumps. Displaced positions that follow each other: a rule rejects
+#: fewer, and does not come to believe them.
+NEAR, FEWEST = 2, 5
 #: Part of a jump by which the one back may differ.
 ALIKE = 0.5
 #: Velocities that together show whether a position changed as they say, and part of the change.
@@ -176,7 +177,10 @@ def displaced_stretches(
     allowed = np.maximum(JUMPED * scatter, STATED * stated)
     stamps, found, away = index_of(table)[rows], list[tuple[float, float]](), list[int]()
     size = 0.0
-    for back in np.flatnonzero((np.abs(steps) > allowed).any(axis=1)).tolist():
+    struck = (np.abs(steps) > allowed).any(axis=1)
+    # A solution that is corrected in earnest swings over several steps: those together are no jump.
+    beside = np.convolve(struck, np.ones(2 * NEAR + 1), "same") - struck
+    for back in np.flatnonzero(struck & (beside == 0)).tolist():
         # Jumps are matched as brackets are: gross errors within a stretch, and stretches apart.
         left, jump = steps[away] + steps[back], np.linalg.norm(steps[back])
         reach = math.sqrt(2.0) * np.maximum(allowed[away], allowed[back])

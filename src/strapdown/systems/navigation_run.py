@@ -470,8 +470,8 @@ def _without_displacements(
             again = drive(other)
         except DivergenceError:
             continue
-        gain, _ = likelihood_gain(run.record.innovations, again.record.innovations)
-        if gain < LEAST_GAIN:
+        gain, count = likelihood_gain(run.record.innovations, again.record.innovations)
+        if gain < max(LEAST_GAIN, GAIN_EACH * count):
             continue
         chain, run = other, again
         findings += (

@@ -291,7 +291,8 @@ def test_fixes_without_such_a_stretch_are_left_alone():
     for seed in range(10):
         assert seen(displaced(seed=seed)) == ()
     for table in (
-        displaced((40.0, 40.6, FAULT), (60.0, 61.0, FAULT)),
+        displaced((40.0, 40.6, FAULT), (60.0, 62.1, FAULT)),
+        displaced((40.0, 40.6, 0.5 * FAULT), (40.6, 60.1, FAULT), (60.1, 60.6, 0.5 * FAULT)),
         displaced((20.0, 145.0, FAULT)),
         displaced((40.0, 200.0, FAULT)),
         displaced((40.0, 60.1, FAULT), (60.1, 80.0, 0.5 * FAULT)),
@@ -390,7 +391,7 @@ def test_what_a_correction_of_the_solution_moves_is_no_jump(every, sd, found):
     own = [geodetic_from_ned(0.1 * FAULT, place) for place in table.loc[bad, GEODETIC].to_numpy()]
     table.loc[bad, GEODETIC] = own
     trajectory = town.motion().trajectory(np.arange(0.0, town.motion().duration, 0.1))
-    trajectory.loc[0.95:2.95, "heading"] += 3.0
+    trajectory.loc[0.95:3.45, "heading"] += 3.0
     told = pd.DataFrame({"weight north, m": 1.0}, index=trajectory.index[::every])
     marks = pd.DataFrame(sd, index=trajectory.index, columns=EULER).assign(
         VN=0.02, VE=0.02, VD=0.02
