@@ -795,7 +795,8 @@ class EpochLoop:
         for aid in self.navigator.aids:
             for name, sd in aid.forgotten(self.observed, at):
                 Q = np.zeros((model.layout.size, model.layout.size))
-                Q[model.layout[name], model.layout[name]] = sd**2
+                place = model.layout[name]
+                Q[place, place] = sd**2 * np.eye(place.stop - place.start)
                 self.engine.carry(np.eye(model.physical_size), Q)
 
     def _told(

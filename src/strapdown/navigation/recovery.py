@@ -11,13 +11,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown import rotation
+from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
 from strapdown.estimation.robust import DOUBT, FEW, Igg3
 from strapdown.frames import place_difference
-from strapdown.navigation.measurements.gnss import PLACE, SPEED
-from strapdown.navigation.record import innovation_labels
-from strapdown.tables import GEODETIC
+from strapdown.navigation.engine import SAME_INSTANT
+from strapdown.navigation.measurements.gnss import PLACE, SPEED, Gnss
+from strapdown.navigation.record import NavigationRecord, innovation_labels
+from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY
 from strapdown.tables.checks import Array, index_of, values_of
+from strapdown.tables.gnss import usable
 
 #: Parts of a stretch after which its noise is told of.
 PARTS = 20
@@ -27,6 +30,15 @@ REJECTED = Igg3().k1
 SWING = 3.0
 #: A receiver that goes no farther than this part of the contradiction stands.
 STANDS = 0.1
+#: Neighbors on each side, whose median is what steps between fixes have in common: the error of the
+#: velocity. A jump is beyond so many standard deviations of a step, by the scatter of all and by
+#: those stated.
+BESIDE, JUMPED, STATED = 5, 6.0, 5.0
+#: Steps on each side that are no jumps. Displaced positions that follow each other: a rule rejects
+#: fewer, and does not come to believe them.
+NEAR, FEWEST = 2, 5
+#: Part of a jump by which the one back may differ.
+ALIKE = 0.5
 #: Velocities that together show whether a position changed as they say, and part of the change.
 TOGETHER, CONFIRMS = 3, 0.3
 
@@ -117,6 +129,116 @@ def wrong_stretches(
                 ):
                     found.append(one)
     return tuple(sorted(found, key=lambda one: one.begin))
+
+
+def displaced_stretches(
+    record: NavigationRecord, table: pd.DataFrame, aid: Gnss
+) -> tuple[tuple[tuple[float, float], ...], float]:
+    """Return stretches of positions that jump away and back by the same, as `Gnss.displaced`.
+
+    What a position moved from one fix to the next beyond the velocity of the solution is a jump of
+    the receiver: a solution that is wrong swings by degrees. Between two opposite jumps positions
+    are displaced by a constant; the longer part of the record is taken for what is not. A jump and
+    the next one back are a gross error of one fix, which the update rule rejects.
+
+    Parameters
+    ----------
+    record : NavigationRecord
+        Of a run over the fixes.
+    table : DataFrame
+        Gnss table.
+    aid : Gnss
+        Receiver.
+
+    Returns
+    -------
+    stretches : tuple of pairs of float, s
+    size : float, m
+        Largest of their displacements.
+    """
+    own = record.trajectory
+    at = index_of(table) - aid.time_offset
+    used = usable(table, POSITION_SD) & np.isin(table["quality"], aid.qualities)
+    rows = np.flatnonzero(used & (at >= own.index[0]) & (at <= own.index[-1]))
+    if len(rows) < 4 * BESIDE or not aid.use_position:
+        return (), 0.0
+    place, at = values_of(table, GEODETIC)[rows], at[rows]
+    way, told = _way(record, at, np.asarray(aid.lever_arm))
+    steps = place_difference(place[1:], place[:-1]) - np.diff(way, axis=0)
+    # Beyond the steps before and those after, between which is that of a velocity that changes.
+    around = np.pad(steps, ((BESIDE, BESIDE), (0, 0)), mode="reflect")
+    around = np.median(np.lib.stride_tricks.sliding_window_view(around, BESIDE, axis=0), axis=-1)
+    before, after = around[: len(steps)], around[-len(steps) :]
+    steps = steps - np.clip(steps, np.minimum(before, after), np.maximum(before, after))
+    scatter = MAD_TO_SD * np.median(np.abs(steps), axis=0)
+    sd = aid.position_sd_factor * values_of(table, POSITION_SD)[rows]
+    slip = np.where(told[:, None], 0.0, _slip(record, at, float(np.linalg.norm(aid.lever_arm))))
+    stated = np.sqrt(np.square(sd[1:]) + np.square(sd[:-1]) + np.square(slip))
+    allowed = np.maximum(JUMPED * scatter, STATED * stated)
+    stamps, found, away = index_of(table)[rows], list[tuple[float, float]](), list[int]()
+    size = 0.0
+    struck = (np.abs(steps) > allowed).any(axis=1)
+    # A solution that is corrected in earnest swings over several steps: those together are no jump.
+    beside = np.convolve(struck, np.ones(2 * NEAR + 1), "same") - struck
+    for back in np.flatnonzero(struck & (beside == 0)).tolist():
+        # Jumps are matched as brackets are: gross errors within a stretch, and stretches apart.
+        left, jump = steps[away] + steps[back], np.linalg.norm(steps[back])
+        reach = math.sqrt(2.0) * np.maximum(allowed[away], allowed[back])
+        matched = (np.abs(left) < reach).all(axis=1) & (np.linalg.norm(left, axis=1) < ALIKE * jump)
+        if not matched.any():
+            away.append(back)
+            continue
+        at_last = int(np.flatnonzero(matched)[-1])
+        first, away = away[at_last], away[:at_last]
+        if back - first >= FEWEST:
+            begin, end = (float(0.5 * (stamps[k] + stamps[k + 1])) for k in (first, back))
+            size = max(size, float(np.linalg.norm(0.5 * (steps[first] - steps[back]))))
+            found = [one for one in found if one[1] < begin] + [(begin, end)]
+    if sum(end - begin for begin, end in found) > 0.5 * (stamps[-1] - stamps[0]):
+        return (), 0.0
+    return tuple(found), size
+
+
+def _way(record: NavigationRecord, at: Array, arm: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Way of an antenna by the motion of a solution, its corrections left out.
+
+    Between two rows with a correction in between the velocity is that of the rows around them: as
+    long as there are some between most instants.
+
+    Returns
+    -------
+    way : ndarray, (n, 3), m
+        North, east, down, at the instants `at`, (n,).
+    told : ndarray of bool, (n - 1,)
+        Whether the way between two instants is without a correction.
+    """
+    time, velocity = index_of(record.trajectory), values_of(record.trajectory, VELOCITY)
+    q = rotation.quaternion_from_euler(values_of(record.trajectory, EULER))
+    steps = np.diff(time)
+    rate = 0.5 * (velocity[1:] + velocity[:-1])
+    rate += np.diff(rotation.rotate(q, arm), axis=0) / steps[:, None]
+    free = np.ones(len(steps), dtype=np.bool_)
+    for table in record.innovations.values():
+        used = (table.filter(like="weight ") > 0.0).to_numpy().any(axis=1)
+        row = time.searchsorted(index_of(table)[used] - SAME_INSTANT) - 1
+        free[row[(row >= 0) & (row < len(free))]] = False
+    middle = 0.5 * (time[1:] + time[:-1])
+    told = np.diff(np.searchsorted(middle[free], at)) > 0
+    if told.mean() < 0.5:
+        told[:] = False
+    else:
+        rate = np.column_stack([np.interp(middle, middle[free], each[free]) for each in rate.T])
+    way = np.concatenate([np.zeros((1, 3)), np.cumsum(rate * steps[:, None], axis=0)])
+    return np.column_stack([np.interp(at, time, each) for each in way.T]), told
+
+
+def _slip(record: NavigationRecord, at: Array, arm: float) -> Array:
+    """Standard deviation of what corrections move an antenna between instants, (n - 1, 3), m."""
+    slip = values_of(record.sd, VELOCITY) * float(np.median(np.diff(at)))
+    turned = np.radians(np.linalg.norm(values_of(record.sd, EULER), axis=1))
+    slip = np.hypot(slip, arm * turned[:, None])
+    rows = np.clip(index_of(record.sd).searchsorted(at[1:]), 0, len(slip) - 1)
+    return np.asarray(slip[rows])
 
 
 def longest(stretches: tuple[Wrong, ...]) -> float:

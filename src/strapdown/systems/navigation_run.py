@@ -64,7 +64,7 @@ from strapdown.navigation.record import (
     standard_deviations,
 )
 from strapdown.navigation.recorder import IntervalRecorder, Recorder
-from strapdown.navigation.recovery import longest, wrong_stretches
+from strapdown.navigation.recovery import displaced_stretches, longest, wrong_stretches
 from strapdown.navigation.replay import PipelineRun, relinearized, run_batch, starts_far
 from strapdown.navigation.smoother import RauchTungStriebel
 from strapdown.progress import Progress, silent
@@ -182,27 +182,26 @@ def run_navigation(
     def show_mode(mode: str, share: float) -> None:
         progress(mode, BEGUN + (ENDED - BEGUN) * share)
 
+    def again(other: NavigationPipeline) -> PipelineRun:
+        return drive(other, source.imu, source.tables, recorder, show_mode)
+
     progress("aligning" if spec.start is None else "navigating", BEGUN)
     with said_of_file(*tables):
-        run = drive(chain, source.imu, source.tables, recorder, show_mode)
+        run = again(chain)
         by_offset: tuple[Finding, ...] = ()
         for _ in range(STEPS_OF_OFFSET):
             chain, by_step = _with_offsets(chain, run.smoothed or run.record)
             if not by_step:
                 break
             by_offset = by_step
-            run = drive(chain, source.imu, source.tables, recorder, show_mode)
+            run = again(chain)
+        chain, run, by_displacement = _without_displacements(chain, run, source.tables, again)
         begun_with = chain
         if not by_offset and run.smoothed is None:
             chain, by_offset = _with_known_offsets(chain, run.record, source.tables)
             if by_offset:
-                run = drive(chain, source.imu, source.tables, recorder, show_mode)
-        chain, run, by_recovery = _recovered(
-            chain,
-            run,
-            source.tables,
-            lambda other: drive(other, source.imu, source.tables, recorder, show_mode),
-        )
+                run = again(chain)
+        chain, run, by_recovery = _recovered(chain, run, source.tables, again)
         begun_with = replace(
             begun_with, navigator=replace(begun_with.navigator, wrong=chain.navigator.wrong)
         )
@@ -291,7 +290,7 @@ def run_navigation(
         *_lost_start(chain, source.imu, best.trajectory),
         *_unsettled(run),
         *by_grade,
-        *in_file((*by_offset, *by_recovery), *tables),
+        *in_file((*by_offset, *by_displacement, *by_recovery), *tables),
     ]
     return NavigationRun(
         spec=spec,
@@ -447,6 +446,52 @@ def _with_known_offsets(
     if findings:
         chain = replace(chain, navigator=with_aids(chain.navigator, tuple(aids)))
     return chain, tuple(findings)
+
+
+def _without_displacements(
+    chain: NavigationPipeline,
+    run: PipelineRun,
+    tables: Mapping[str, pd.DataFrame],
+    drive: Callable[[NavigationPipeline], PipelineRun],
+) -> tuple[NavigationPipeline, PipelineRun, tuple[Finding, ...]]:
+    """Repeat a run over positions that jump away and back, with their displacement as a state.
+
+    Kept where it explains the measurements better, rejected ones included.
+    """
+    findings: tuple[Finding, ...] = ()
+    for aid in chain.navigator.aids:
+        if not isinstance(aid, Gnss) or aid.displaced:
+            continue
+        found, size = displaced_stretches(run.record, tables[aid.name], aid)
+        if not found:
+            continue
+        other = _with_aid(chain, replace(aid, displaced=found))
+        try:
+            again = drive(other)
+        except DivergenceError:
+            continue
+        gain, count = likelihood_gain(run.record.innovations, again.record.innovations)
+        if gain < max(LEAST_GAIN, GAIN_EACH * count):
+            continue
+        chain, run = other, again
+        findings += (
+            Finding(
+                "navigation.run-again-with-displacement",
+                severity="warning",
+                file=source_of(tables[aid.name]),
+                quantity="lat, lon, alt",
+                size=size,
+                listed=[f"{begin:.5g} to {end:.5g} s" for begin, end in found],
+                given=str([[round(x, 3) for x in one] for one in found]),
+            ),
+        )
+    return chain, run, findings
+
+
+def _with_aid(chain: NavigationPipeline, aid: Measurement) -> NavigationPipeline:
+    """Return a pipeline with other options of the aid of this name, and the states they state."""
+    aids = tuple(aid if one.name == aid.name else one for one in chain.navigator.aids)
+    return replace(chain, navigator=with_aids(chain.navigator, aids))
 
 
 def _recovered(

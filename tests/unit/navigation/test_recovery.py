@@ -1,6 +1,7 @@
 """A solution that good fixes contradict is run again with the noise that explains it."""
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -11,14 +12,20 @@ from tests.town_drive import DEG
 from strapdown.errors import DivergenceError
 from strapdown.estimation.robust import AdaptiveRule, AdaptiveScale, Igg3
 from strapdown.frames import geodetic_from_ned
-from strapdown.navigation.measurements.gnss import PLACE
+from strapdown.navigation.measurements.gnss import PLACE, Gnss
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.recorder import FullRecorder
-from strapdown.navigation.recovery import PARTS, Wrong, longest, wrong_stretches
+from strapdown.navigation.recovery import (
+    PARTS,
+    Wrong,
+    displaced_stretches,
+    longest,
+    wrong_stretches,
+)
 from strapdown.navigation.replay import PipelineRun
 from strapdown.navigation.smoother import RauchTungStriebel
-from strapdown.systems.navigation_run import _recovered
-from strapdown.tables import GEODETIC, VELOCITY, VELOCITY_SD
+from strapdown.systems.navigation_run import _recovered, _without_displacements
+from strapdown.tables import EULER, GEODETIC, VELOCITY, VELOCITY_SD
 
 RULE = AdaptiveRule(Igg3(), AdaptiveScale(lowest=1.0))
 
@@ -47,11 +54,11 @@ def pushed(push=0.0, turn=0.0, begin=50.0, end=58.0):
     return time, rows
 
 
-def navigated(table, samples, smoother=None, asked=None):
+def navigated(table, samples, smoother=None, asked=None, step=_recovered):
     """The run as its pipeline would have it, repeated where it is contradicted."""
 
     def drive(chain):
-        _, state = town.begun(town.gnss(rule=RULE))
+        _, state = town.begun(*chain.navigator.aids)
         navigator = chain.navigator
         state = navigator.tell(state, "gnss", table)
         state, piece = navigator.advance(state, *samples)
@@ -67,7 +74,7 @@ def navigated(table, samples, smoother=None, asked=None):
     navigator, _ = town.begun(town.gnss(rule=RULE))
     chain = SimpleChain(replace(navigator, smoother=smoother))
     first = drive(chain)
-    return first, _recovered(chain, first, {"gnss": table}, drive if asked is None else asked)
+    return first, step(chain, first, {"gnss": table}, drive if asked is None else asked)
 
 
 def off(record):
@@ -230,3 +237,165 @@ def test_a_short_contradiction_is_left_to_the_rule():
     assert wrong_stretches(first.record.innovations, {"gnss": table})
     assert run is first
     assert findings == ()
+
+
+FAULT = np.array([20.0, -15.0, 8.0])
+
+
+def displaced(*stretches, sd=0.05, seed=5):
+    """Positions without velocities, of which those of each stretch are displaced by its fault."""
+    table = town.fixes(seed, position_noise=sd)
+    table[VELOCITY], table[VELOCITY_SD] = 0.0, np.inf
+    for begin, end, fault in stretches:
+        bad = (table.index > begin) & (table.index < end)
+        own = [geodetic_from_ned(fault, place) for place in table.loc[bad, GEODETIC].to_numpy()]
+        table.loc[bad, GEODETIC] = own
+    return table
+
+
+@pytest.mark.parametrize("smoother", [None, RauchTungStriebel()])
+def test_positions_that_jump_away_and_back_do_not_pull_the_solution(smoother):
+    """Forty seconds beside by 26 m, and another stretch of another size, with positions alone."""
+    table = displaced((40.0, 80.0, FAULT), (120.0, 130.0, -0.4 * FAULT))
+    first, (chain, run, (finding,)) = navigated(
+        table, pushed(), smoother, step=_without_displacements
+    )
+    assert finding.code == "navigation.run-again-with-displacement"
+    one, other = chain.navigator.aids[0].displaced
+    # Between two fixes, which are half a second apart.
+    np.testing.assert_allclose([*one, *other], [40.0, 80.0, 120.0, 130.0], atol=0.26)
+    assert finding.data["size"] == pytest.approx(np.linalg.norm(FAULT), rel=0.02)
+    for record in (run.record, run.smoothed or run.record):
+        distance, bounds = off(record)
+        assert distance.max() < 0.1 * off(first.record)[0].max()
+        assert bounds.max() < 4.0
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_displacement_of_a_stretch_is_estimated_with_its_error(seed):
+    """At the end of each stretch: the error within 4 standard deviations, these below a fix's."""
+    table = displaced((40.0, 60.0, FAULT), (90.0, 110.0, -0.8 * FAULT), sd=1.0, seed=100 + seed)
+    _, (_, run, _) = navigated(table, pushed(), step=_without_displacements)
+    names = [f"gnss.displacement_{axis}" for axis in ("north", "east", "down")]
+    for end, true in ((59.9, FAULT), (109.9, -0.8 * FAULT)):
+        at = run.record.sensors.index.searchsorted(end)
+        found, sd = (
+            of[names].iloc[at].to_numpy() for of in (run.record.sensors, run.record.sensors_sd)
+        )
+        assert (np.abs(found - true) < 4.0 * sd).all()
+        assert (sd < 1.0).all()
+
+
+def test_fixes_without_such_a_stretch_are_left_alone():
+    """Of sound ones, of gross errors of one or two, and where most of the record is displaced."""
+    for seed in range(10):
+        assert seen(displaced(seed=seed)) == ()
+    for table in (
+        displaced((40.0, 40.6, FAULT), (60.0, 62.1, FAULT)),
+        displaced((40.0, 40.6, 0.5 * FAULT), (40.6, 60.1, FAULT), (60.1, 60.6, 0.5 * FAULT)),
+        displaced((20.0, 145.0, FAULT)),
+        displaced((40.0, 200.0, FAULT)),
+        displaced((40.0, 60.1, FAULT), (60.1, 80.0, 0.5 * FAULT)),
+        displaced((40.0, 80.0, 0.01 * FAULT)),
+        displaced((40.0, 200.0, [0.5, 0.0, 0.0]), (90.0, 200.0, [0.0, 0.5, 0.0])),
+    ):
+        assert seen(table) == ()
+
+
+def test_between_two_displaced_stretches_positions_are_sound():
+    """Also with a gross error of one fix within the first."""
+    table = displaced((40.0, 60.0, FAULT), (50.0, 50.6, -3.0 * FAULT), (70.0, 90.0, FAULT))
+    found = seen(table)
+    np.testing.assert_allclose([one[0] for one in found], [40.0, 70.0], atol=0.26)
+
+
+def test_positions_that_are_displaced_any_cut_gives_the_same_bits():
+    table, found = displaced((20.0, 31.0, FAULT), (40.0, 60.0, FAULT)), []
+    for sizes in ([10**6], [7, 50, 3]):
+        aid = town.gnss(rule=RULE, displaced=((20.0, 31.0), (40.0, 60.0)))
+        navigator, state = town.begun(aid)
+        time, rows = town.increments()
+        state, at, k = navigator.tell(state, "gnss", table), 0, 0
+        while at < 4000:
+            end = min(at + sizes[k % len(sizes)], 4000)
+            state, _ = navigator.advance(state, time[at:end], rows[at:end])
+            at, k = end, k + 1
+        found.append(state.engine.filter.covariance)
+    np.testing.assert_array_equal(*found)
+
+
+def seen(table, aid=None, slip=0.0):
+    """Stretches that are found beside a solution whose velocity is off by a constant, m/s."""
+    trajectory = town.motion().trajectory(np.arange(0.0, town.motion().duration, 0.1))
+    trajectory[VELOCITY] += slip
+    sd = pd.DataFrame(1.0, index=trajectory.index[::5], columns=[*VELOCITY, *EULER])
+    record = SimpleNamespace(trajectory=trajectory, innovations={}, sd=sd)
+    return displaced_stretches(record, table, aid or town.gnss())[0]
+
+
+def test_a_velocity_that_is_off_makes_no_jump_and_hides_none():
+    table = displaced((40.0, 80.0, 0.05 * FAULT))
+    time = np.arange(0.0, town.motion().duration, 0.1)
+    for_a_while = np.where((time > 100.0) & (time < 120.0), 5.0, 0.0)[:, None]
+    (right,), (slipping,) = seen(table), seen(table, slip=5.0)
+    assert slipping == pytest.approx(right, abs=0.05)
+    assert seen(table, slip=for_a_while) == (right,)
+
+
+def test_an_antenna_far_from_the_sensors_makes_no_jump_and_hides_none():
+    """Eight metres, of which a bend makes as much between two fixes."""
+    arm = (8.0, 0.0, 0.0)
+    table = town.fixes(5, position_noise=0.05, antenna=arm, rate=0.5)
+    assert seen(table, Gnss(name="gnss", lever_arm=arm)) == ()
+    bad = (table.index > 40.0) & (table.index < 80.0)
+    own = [geodetic_from_ned(0.1 * FAULT, place) for place in table.loc[bad, GEODETIC].to_numpy()]
+    table.loc[bad, GEODETIC] = own
+    (found,) = seen(table, Gnss(name="gnss", lever_arm=arm))
+    np.testing.assert_allclose(found, [40.0, 80.0], atol=1.01)
+
+
+def test_stretches_are_those_of_the_stamps():
+    table = displaced((40.0, 80.0, FAULT))
+    table.index += 100.0
+    (found,) = seen(table, town.gnss(time_offset=100.0))
+    np.testing.assert_allclose(found, [140.0, 180.0], atol=0.26)
+    aid = town.gnss(time_offset=100.0, displaced=(found, (190.0, 200.0)))
+    assert aid.forgotten(89.0, 90.0) == [("gnss.displacement", 100.0)]
+    assert aid.forgotten(90.0, 91.0) == aid.forgotten(40.0, 41.0) == []
+
+
+def test_fixes_that_are_not_used_are_not_looked_at():
+    table = displaced((40.0, 80.0, FAULT))
+    table.loc[40.1:79.9, "quality"] = 6
+    assert seen(table) == ()
+    assert seen(displaced((40.0, 80.0, FAULT)), town.gnss(use_position=False)) == ()
+
+
+def test_a_stretch_within_a_stretch_is_left_to_the_rule():
+    (found,) = seen(displaced((40.0, 80.0, FAULT), (55.0, 60.0, 2.0 * FAULT)))
+    np.testing.assert_allclose(found, [40.0, 80.0], atol=0.26)
+
+
+@pytest.mark.parametrize(
+    ("every", "sd", "found"), [(5, 2.0, [90]), (1, 2.0, []), (1, 0.5, [90]), (1, 0.01, [0, 90])]
+)
+def test_what_a_correction_of_the_solution_moves_is_no_jump(every, sd, found):
+    """A fix that turns it by 3 deg about an arm of 8 m, 0.4 m, and one that turns it back.
+
+    Between other fixes that correct it. Where rows are free of them, those show the motion; else a
+    jump is beyond the standard deviations, which 3 deg should not be. The positions jump by 2.6 m.
+    """
+    arm = (8.0, 0.0, 0.0)
+    table = town.fixes(5, position_noise=0.01, antenna=arm)
+    bad = (table.index > 90.0) & (table.index < 100.0)
+    own = [geodetic_from_ned(0.1 * FAULT, place) for place in table.loc[bad, GEODETIC].to_numpy()]
+    table.loc[bad, GEODETIC] = own
+    trajectory = town.motion().trajectory(np.arange(0.0, town.motion().duration, 0.1))
+    trajectory.loc[0.95:3.45, "heading"] += 3.0
+    told = pd.DataFrame({"weight north, m": 1.0}, index=trajectory.index[::every])
+    marks = pd.DataFrame(sd, index=trajectory.index, columns=EULER).assign(
+        VN=0.02, VE=0.02, VD=0.02
+    )
+    record = SimpleNamespace(trajectory=trajectory, innovations={"gnss.position": told}, sd=marks)
+    stretches, _ = displaced_stretches(record, table, Gnss(name="gnss", lever_arm=arm))
+    assert [int(one[0]) for one in stretches] == found

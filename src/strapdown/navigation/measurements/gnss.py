@@ -33,8 +33,9 @@ from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import Array, index_of, is_number, source_of, values_of
 from strapdown.tables.gnss import QUALITIES
 
-#: Kind of an epoch: the first of its values.
-POSITION_CODE, VELOCITY_CODE, HORIZONTAL_CODE = 0.0, 1.0, 2.0
+#: Kind of an epoch: the first of its values. The last is a position that is displaced.
+POSITION_CODE, VELOCITY_CODE, HORIZONTAL_CODE, DISPLACED_CODE = 0.0, 1.0, 2.0, 3.0
+POSITIONS = (POSITION_CODE, DISPLACED_CODE)
 PLACE = ("north, m", "east, m", "down, m")
 SPEED = ("VN, m/s", "VE, m/s", "VD, m/s")
 #: Beyond this, s, a time offset is a wrong clock, and the second-order arc is not valid.
@@ -45,6 +46,8 @@ LASTING = 100.0
 #: Share of the variance of a float solution that lasts, and how long, s: wrong ambiguities are the
 #: same from fix to fix until the receiver loses a signal.
 FLOAT_SHARE, FLOAT_LASTING = 0.9, 30.0
+#: Standard deviation of a displacement of positions before any of them, m: reflections in a town.
+DISPLACEMENT_SD = 100.0
 #: A velocity or acceleration is clear of its error from so many of its standard deviations.
 CLEAR = 3.0
 TINY = 1e-300
@@ -100,6 +103,10 @@ class Gnss(TabulatedMeasurement):
         float solution, whose carrier-phase ambiguities are not integers. Its errors are not those
         of fixed solutions in another size, and most of them last: states ``NAME.float_error``, in
         standard deviations of `FLOAT_SHARE`, for `FLOAT_LASTING`. Zero: none is.
+    displaced : tuple of pairs of float, s
+        Stretches of stamps, from the first to before the second, whose positions are all displaced
+        by the same: wrong ambiguities, or a reflection. By how much is estimated: states
+        ``NAME.displacement``, north, east, down, `DISPLACEMENT_SD` for each stretch.
     position_sd_factor, velocity_sd_factor : float
         Factors on the stated standard deviations.
     least_position_sd, least_velocity_sd : float, m and m/s
@@ -124,6 +131,7 @@ class Gnss(TabulatedMeasurement):
     position_correlated_share: float = 0.0
     position_correlation_time: float = _in("s", LASTING)
     float_position_sd: float = _in("m")
+    displaced: tuple[tuple[float, float], ...] = field(default=(), metadata={"unit": "s"})
     use_position: bool = True
     use_velocity: bool = True
     position_sd_factor: float = 1.0
@@ -172,6 +180,10 @@ class Gnss(TabulatedMeasurement):
                 raise ConfigError("navigation.clock-unsure-sd", quantity="clock_unsure", sd=sd)
         if self.clock_unsure and not self.time_offset_sd:
             raise ConfigError("navigation.time-offset-walks-not-estimated", quantity="clock_unsure")
+        if not all(begin < end for begin, end in self.displaced):
+            raise ConfigError(
+                "navigation.displaced-not-stretches", quantity="displaced", given=self.displaced
+            )
         lever_arm(self.lever_arm_sd)
 
     def states(self) -> tuple[SensorStates, ...]:
@@ -188,12 +200,19 @@ class Gnss(TabulatedMeasurement):
         if self.float_position_sd > 0.0:
             lasting = unseen("float_error", ("north", "east", "down"), "1", 1.0)
             out.append(gauss_markov(lasting.named(self._float), FLOAT_LASTING))
+        if self.displaced:
+            axes = ("north", "east", "down")
+            beside = unseen("displacement", axes, "m", DISPLACEMENT_SD)
+            out.append(beside.named(self._displacement))
         return tuple(out)
 
     def forgotten(self, since: float, until: float) -> list[tuple[str, float]]:
-        """Return the time offset where the clock may have stepped; see `Measurement.forgotten`."""
-        times = ((stamp - self.time_offset, sd) for stamp, sd in self.clock_unsure)
-        return [(self._offset, sd) for time, sd in times if since < time <= until]
+        """Return what changes at an instant: the time offset, and what displaces positions."""
+        steps = [(self._offset, stamp, sd) for stamp, sd in self.clock_unsure]
+        steps += [(self._displacement, stamp, DISPLACEMENT_SD) for stamp, _ in self.displaced[1:]]
+        return [
+            (name, sd) for name, stamp, sd in steps if since < stamp - self.time_offset <= until
+        ]
 
     @property
     def lasts(self) -> bool:
@@ -250,6 +269,8 @@ class Gnss(TabulatedMeasurement):
             codes = np.full(len(value), code)
             if code == POSITION_CODE:
                 value = np.column_stack([np.radians(value[:, :2]), value[:, 2]])
+                for begin, end in self.displaced:
+                    codes[(index_of(table) >= begin) & (index_of(table) < end)] = DISPLACED_CODE
             elif used:
                 # Many receivers output speed and course only.
                 level = good & measured[:, :2].all(axis=1) & ~measured[:, 2]
@@ -264,9 +285,14 @@ class Gnss(TabulatedMeasurement):
         return Epochs(at[order], np.concatenate(rows)[order])
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the innovation of a position or velocity, NED: computed − measured."""
+        """Return the innovation of a position or velocity, NED: computed − measured.
+
+        None of a displaced position without the state of its displacement.
+        """
+        if values[0] == DISPLACED_CODE and not view.has(self._displacement):
+            return []
         arm = arm_of(view, self._arm, np.asarray(self.lever_arm))
-        of_place, late_by = values[0] == POSITION_CODE, view.has(self._offset)
+        of_place, late_by = values[0] in POSITIONS, view.has(self._offset)
         upto = ACCELERATION if late_by else POSITION if of_place else VELOCITY
         motion = moving(view, arm, self._arm, upto)
         computed = motion[POSITION if of_place else VELOCITY]
@@ -283,7 +309,7 @@ class Gnss(TabulatedMeasurement):
         unclear = np.zeros(3)
         if late_by:
             of, dof = C_nl @ shift.value, C_nl @ shift.H
-            by_offset, unclear = _by_offset(view, self._offset, float(values[0]), of, dof)
+            by_offset, unclear = _by_offset(view, self._offset, of_place, of, dof)
             H[:, view.place(self._offset)] = -by_offset[:, None]
         if of_place:
             here, figure = view.here, view.ellipsoid
@@ -297,6 +323,9 @@ class Gnss(TabulatedMeasurement):
                 z += lasting * view.estimate(error)
                 H[:, view.place(error)] = -np.diag(lasting)
                 variance = (1.0 - share) * variance
+            if values[0] == DISPLACED_CODE:
+                z += view.estimate(self._displacement)
+                H[:, view.place(self._displacement)] = -np.eye(3)
         else:
             z -= values[1:4]
         name, labels = self.names(float(values[0]))
@@ -305,7 +334,7 @@ class Gnss(TabulatedMeasurement):
 
     def names(self, code: float) -> tuple[str, tuple[str, ...]]:
         """Return the name of the observation of an epoch, and the labels of its components."""
-        if code == POSITION_CODE:
+        if code in POSITIONS:
             return f"{self.name}.position", PLACE
         return f"{self.name}.velocity", SPEED[:2] if code == HORIZONTAL_CODE else SPEED
 
@@ -325,6 +354,10 @@ class Gnss(TabulatedMeasurement):
     def _float(self) -> str:
         return f"{self.name}.float_error"
 
+    @property
+    def _displacement(self) -> str:
+        return f"{self.name}.displacement"
+
     def _floats(self, variance: Array) -> bool:
         """Whether a position with these variances, m², as used, is a float solution."""
         least = self.position_sd_factor * self.float_position_sd
@@ -332,7 +365,7 @@ class Gnss(TabulatedMeasurement):
 
 
 def _by_offset(
-    view: View, name: str, code: float, shift: Array, of_shift: Array
+    view: View, name: str, of_place: bool, shift: Array, of_shift: Array
 ) -> tuple[Array, Array]:
     """Derivative of what is observed by the time offset, and variance of what that leaves out.
 
@@ -348,8 +381,8 @@ def _by_offset(
 
     Parameters
     ----------
-    code : float
-        Kind of the epoch: each keeps a derivative of its own.
+    of_place : bool
+        Of a position; of a velocity otherwise. Each keeps a derivative of its own.
     shift : ndarray, (3,)
         Velocity, m/s, or acceleration, m/s², north-east-down.
     of_shift : ndarray, (3, p)
@@ -358,10 +391,10 @@ def _by_offset(
     P = view.covariance
     at = view.place(name).start
     own = np.einsum("ij,jk,ik->i", of_shift, P, of_shift)
-    kept = f"{name}.{'velocity' if code == POSITION_CODE else 'acceleration'}"
+    kept = f"{name}.{'velocity' if of_place else 'acceleration'}"
     before = view.kept.get(kept, np.zeros(3))
     change = shift - before
-    if code == POSITION_CODE:
+    if of_place:
         recent = view.corrected
         change = change - recent * np.minimum(1.0, CLEAR**2 * own / np.maximum(recent**2, TINY))
     clear = before + change * np.maximum(1.0 - CLEAR**2 * own / np.maximum(change**2, TINY), 0.0)

@@ -77,9 +77,9 @@ class Measurement(ABC):
         return ()
 
     def forgotten(self, since: float, until: float) -> Iterable[tuple[str, float]]:
-        """Return states of one element that changed after an instant, s, and by then, unseen.
+        """Return states that changed after an instant, s, and by then, unseen.
 
-        Each with the standard deviation of its change.
+        Each with the standard deviation of its change, of each element.
         """
         return ()
 

@@ -225,6 +225,7 @@ def test_a_fix_that_claims_to_be_exact_is_refused_with_the_option_that_helps():
         ({"position_sd_factor": 0.0}, "position_sd_factor"),
         ({"position_correlated_share": 1.0}, "position_correlated_share"),
         ({"position_correlation_time": 0.0}, "position_correlation_time"),
+        ({"displaced": ((60.0, 60.0),)}, "displaced"),
     ],
 )
 def test_options_out_of_range_are_refused(options, quantity):
