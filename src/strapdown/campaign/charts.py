@@ -20,12 +20,12 @@ from strapdown.campaign.results import (
     quantile,
     shown,
 )
+from strapdown.constants import Array
 from strapdown.report.chart import (
     BLACK,
     BLUE,
     ORANGE,
     VERMILLION,
-    Array,
     Bars,
     Chart,
     Fill,

@@ -10,11 +10,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.constants import Array
 from strapdown.dsp.derivative import LocalWeights, mirrored
 from strapdown.dsp.samples import as_channels, positive_step
 from strapdown.errors import ConfigError, DataError
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 # Reserve: Kaiser's length formula is a fit, and a gain of exactly 1 at zero shifts the ripple of

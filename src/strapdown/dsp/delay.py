@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import Array
 from strapdown.dsp.decimation import decimate, low_pass_design
 from strapdown.dsp.samples import as_channels, positive_step
 from strapdown.errors import DataError
-
-Array = NDArray[np.float64]
 
 # Rates above add noise and hardly any signal: structures of vehicles vibrate at 30 to 300 Hz.
 COMMON_RATE = 1000.0  # Hz

@@ -11,14 +11,11 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from strapdown.constants import Array
 from strapdown.errors import ConfigError, DataError
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-
-
-Array = NDArray[np.float64]
-
 
 # Value and slope of a polynomial fitted to a few samples, as weights of the samples.
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown.attitude_algorithms import AttitudeAlgorithm
+from strapdown.constants import Array
 from strapdown.export.algorithms import (
     SAMPLINGS,
     algorithm_kernels,
@@ -31,7 +32,7 @@ from strapdown.export.filters import (
     title_of,
 )
 from strapdown.export.kernels import Kernels
-from strapdown.export.program import Array, Vector
+from strapdown.export.program import Vector
 from strapdown.export.sources import Kernel
 from strapdown.export.types_of_c import WIDTH
 from strapdown.orientation_filters import OrientationEstimator

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95, Array
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath, PathComparison, PathSamples
 from strapdown.crash.reconstruction import UnitReconstruction
@@ -23,7 +23,6 @@ from strapdown.report.chart import (
     ORANGE,
     SKY,
     VERMILLION,
-    Array,
     Band,
     Chart,
     Fill,

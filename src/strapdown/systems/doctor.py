@@ -12,7 +12,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.bundle import InputFiles, Seal, log_files
@@ -74,8 +73,6 @@ from strapdown.systems.navigation_proposal import (
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, MAG, POSITION_SD, find_gaps
 from strapdown.tables.checks import index_of, values_of
-
-Array = NDArray[np.float64]
 
 #: Uses that a log is judged for.
 USES = ("attitude", "navigation", "crash")
