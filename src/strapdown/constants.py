@@ -1,4 +1,4 @@
-"""Physical constants, each with its source, and the type of arrays of numbers."""
+"""Physical constants, each with its source, and the types of arrays."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+Triple = tuple[float, float, float]
 
 #: Conventional standard acceleration of gravity, m/s² (3rd CGPM, 1901, Resolution 2).
 STANDARD_GRAVITY = 9.80665

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown.constants import STANDARD_GRAVITY, Flags
 from strapdown.crash.acceleration import window_weights
 from strapdown.crash.measuring_point import LEVER_ARM, MOUNTING, NO_TURNING, PointKinematics
 from strapdown.crash.structure import (
@@ -729,7 +729,6 @@ def axis_findings(match: AxisMatch, first: str, second: str) -> list[Finding]:
 
 # Comparison of several units on one vehicle: whether they agree within stated uncertainty.
 
-Flags = NDArray[np.bool_]
 # Variance of assumed axes, relative to the largest: no weight beside measured ones.
 NO_WEIGHT = 1e8
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import Array
+from strapdown.constants import Array, Flags
 from strapdown.dsp.decimation import decimate, low_pass_design
 from strapdown.dsp.samples import as_channels, positive_step
 from strapdown.errors import DataError
@@ -266,8 +266,6 @@ def _variance(slope: Array, residual: Array, width: float) -> float:
 
 
 # Correlation of two signals over their lags, with gaps, and its peaks.
-
-Flags = NDArray[np.bool_]
 
 
 def lag_correlation(

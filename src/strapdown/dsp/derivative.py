@@ -11,7 +11,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from strapdown.constants import Array
+from strapdown.constants import Array, Indices
 from strapdown.errors import ConfigError, DataError
 
 if TYPE_CHECKING:
@@ -170,8 +170,6 @@ def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0)
 
 
 # Outputs that are local weighted sums of samples, and their noise.
-
-Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

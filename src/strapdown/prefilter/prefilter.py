@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.constants import Indices
 from strapdown.dsp.outliers import KEPT, REPLACED, Screened
 from strapdown.dsp.samples import check_segment, even_step
 from strapdown.errors import ConfigError, DataError, Finding
@@ -217,7 +218,6 @@ def whole_factor(rate: float, grid: Grid, name: str) -> int:
 
 # Report of a prefilter: changed samples, and its effect on time, noise and frequencies.
 
-Indices = NDArray[np.int64]
 
 # Flagged samples with fewer samples between them belong to one event.
 APART = 32

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from strapdown.constants import Flags
 from strapdown.dsp.decimation import (
     Resampled,
     decimate,
@@ -191,7 +191,6 @@ def _length(channels: TriadChannels) -> EvenSignal:
 
 # Resampling of a triad to common stamps: faster ones without aliasing, slower ones interpolated.
 
-Flags = NDArray[np.bool_]
 
 # Stamps that agree to within this fraction of a step are equal.
 SAME_STAMP = 1e-3

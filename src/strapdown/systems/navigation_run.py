@@ -28,6 +28,7 @@ from strapdown.config.navigation import (
     make_aids,
     make_filter,
 )
+from strapdown.constants import Triple
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import DivergenceError, Finding, StrapdownError
 from strapdown.estimation.robust import DOUBT
@@ -853,9 +854,6 @@ class NavigationRun(SavedRun):
 # The pipeline of a configuration.
 
 
-Three = tuple[float, float, float]
-
-
 def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> NavigationPipeline:
     """Build the pipeline of a specification.
 
@@ -943,6 +941,6 @@ def _known(start: StartTable) -> KnownStart:
     )
 
 
-def _three(value: float | Three) -> Three:
+def _three(value: float | Triple) -> Triple:
     x, y, z = (float(v) for v in np.broadcast_to(value, 3))
     return x, y, z
