@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -51,13 +52,15 @@ class Kind:
 
     run: Callable[[Table, str], Any]
     data: Callable[[Any], Table]
-    save: Callable[[Any, Path, bool], Any]
     scalars: Mapping[str, str]
     seed: KeyPath = ()
     log: KeyPath = ()
     curves: Callable[[Any], pd.DataFrame] | None = None
     curve_names: tuple[str, ...] = field(default=())
     view: Callable[[Any], Any] = field(default=lambda run: run)
+    save: Callable[[Any, Path, bool], Any] = field(
+        default=lambda run, out, force: run.save(out, force=force)
+    )
 
 
 # --- paths in plain data ------------------------------------------------------------------
@@ -103,8 +106,20 @@ def with_value(table: Table, path: KeyPath, value: Any) -> Table:
     return out
 
 
-def _save_run(run: Any, out: Path, force: bool) -> Any:
-    return run.save(out, force=force)
+def _named(name: str) -> Any:
+    """What a module of the package defines, imported when it is wanted: ``module:name``."""
+    module, _, attribute = name.partition(":")
+    return getattr(import_module(f"strapdown.{module}"), attribute)
+
+
+def _by_form(form: str, run: str) -> Callable[[Table, str], Any]:
+    """The run of a configuration file of a form, each as `_named`."""
+    return lambda table, name: _named(run)(_named(form).checked({**table, "name": name}))
+
+
+def _from_result(data: str) -> Callable[[Any], Table]:
+    """The plain data of a result by a function, as `_named`."""
+    return lambda run: dict(_named(data)(run))
 
 
 # --- navigation and alignment -------------------------------------------------------------
@@ -130,12 +145,6 @@ def _proposed(table: Table) -> Table:
         gnss=None if fixes is None else specify(FixesTable, **fixes),
     )
     return proposal.table
-
-
-def _navigation_view(run: Any) -> Any:
-    from strapdown.report.navigation_evaluation import NavigationEvaluation
-
-    return NavigationEvaluation(run)
 
 
 def _navigation_data(evaluation: Any) -> Table:
@@ -184,13 +193,6 @@ def _navigation_curves(evaluation: Any) -> pd.DataFrame:
         },
         index=errors.time - begin,
     )
-
-
-def _align(table: Table, name: str) -> Any:
-    from strapdown.config.alignment import AlignmentSpec
-    from strapdown.systems.alignment_run import run_alignment
-
-    return run_alignment(AlignmentSpec.checked({**table, "name": name}))
 
 
 def _alignment_data(run: Any) -> Table:
@@ -267,35 +269,9 @@ def _outage(table: Table, name: str) -> Any:
     return run_outage(specify(OutageSpec, **table), budget=False)
 
 
-def _outage_data(run: Any) -> Table:
-    from strapdown.report.outage import outage_parts
-
-    return outage_parts(run)
-
-
 def _outage_curves(run: Any) -> pd.DataFrame:
     time, bound, _ = run.cone
     return pd.DataFrame({"horizontal_95_m": bound}, index=time - time[0])
-
-
-def _calibrate(table: Table, name: str) -> Any:
-    from strapdown.config.logs import CalibrateSpec
-    from strapdown.systems.calibrate_run import run_calibrate
-
-    return run_calibrate(CalibrateSpec.checked({**table, "name": name}))
-
-
-def _calibrate_data(run: Any) -> Table:
-    from strapdown.report.calibrate import calibrate_json
-
-    return calibrate_json(run)
-
-
-def _doctor(table: Table, name: str) -> Any:
-    from strapdown.config.logs import DoctorSpec
-    from strapdown.systems.doctor import run_doctor
-
-    return run_doctor(DoctorSpec.checked({**table, "name": name}))
 
 
 def _doctor_data(run: Any) -> Table:
@@ -468,7 +444,6 @@ KINDS: dict[str, Kind] = {
     "navigate": Kind(
         _navigate,
         _navigation_data,
-        _save_run,
         {
             **_ends(("north", "east", "down"), "m"),
             **_ends(("VN", "VE", "VD"), "m_per_s"),
@@ -485,12 +460,11 @@ KINDS: dict[str, Kind] = {
         ("log", "path"),
         _navigation_curves,
         ("horizontal_error_m", "horizontal_sd_m", "height_error_m", "heading_error_deg"),
-        _navigation_view,
+        view=lambda run: _named("report.navigation_evaluation:NavigationEvaluation")(run),
     ),
     "align": Kind(
-        _align,
+        _by_form("config.alignment:AlignmentSpec", "systems.alignment_run:run_alignment"),
         _alignment_data,
-        _save_run,
         {
             **_ends(("roll", "pitch", "heading"), "deg"),
             "heading_sd_deg": "end.heading_sd_deg",
@@ -502,7 +476,6 @@ KINDS: dict[str, Kind] = {
     "attitude": Kind(
         _attitude,
         _attitude_data,
-        _save_run,
         {
             "final_deg": "first.error_deg",
             "rms_deg": "first.rms_deg",
@@ -514,8 +487,7 @@ KINDS: dict[str, Kind] = {
     ),
     "outage": Kind(
         _outage,
-        _outage_data,
-        _save_run,
+        _from_result("report.outage:outage_parts"),
         {
             key: f"at_the_end.{key}"
             for key in (
@@ -529,7 +501,6 @@ KINDS: dict[str, Kind] = {
     "crash": Kind(
         _crash,
         _crash_data,
-        _save_crash,
         {
             **_ends(("delta_v", "delta_v_forward", "delta_v_right"), "m_per_s"),
             **_ends(("pdof",), "deg"),
@@ -541,18 +512,17 @@ KINDS: dict[str, Kind] = {
         ("simulate", "seed"),
         curves=_crash_curves,
         curve_names=("north_m", "east_m", "speed_m_per_s"),
+        save=_save_crash,
     ),
     "calibrate": Kind(
-        _calibrate,
-        _calibrate_data,
-        _save_run,
+        _by_form("config.logs:CalibrateSpec", "systems.calibrate_run:run_calibrate"),
+        _from_result("report.calibrate:calibrate_json"),
         {"rests": "rests", "excess": "excess"},
         log=("logs", 0, "path"),
     ),
     "doctor": Kind(
-        _doctor,
+        _by_form("config.logs:DoctorSpec", "systems.doctor:run_doctor"),
         _doctor_data,
-        _save_run,
         {
             key: f"log.{key}"
             for key in (
