@@ -27,7 +27,6 @@ if TYPE_CHECKING:
         energy_share,
         equal_force_share,
         impulse_of,
-        measured_crush_energy,
     )
     from strapdown.crash.delta_v import delta_v, trailing_delta_v
     from strapdown.crash.delta_v_bound import (
@@ -81,7 +80,6 @@ __all__ = [
     "energy_share",
     "equal_force_share",
     "impulse_of",
-    "measured_crush_energy",
     "ned_pdof",
     "pdof",
     "prepare_unit",
@@ -99,7 +97,7 @@ load_on_first_use(
         "closure": "Blame Closure Figure Hypothesis ImpactVehicle against_barrier blame "
         "blame_points close_vehicles",
         "deformation": "Crush crush_energy dynamic_crush energy_equivalent_speed energy_share "
-        "equal_force_share impulse_of measured_crush_energy",
+        "equal_force_share impulse_of",
         "delta_v": "delta_v trailing_delta_v",
         "delta_v_bound": "EventChanges VelocityChange body_delta_v_bound "
         "resolved_delta_v_bound velocity_change",
