@@ -9,7 +9,6 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from strapdown.config.spec import specify
 from strapdown.config.toml_file import KeyPath, read_toml
 from strapdown.constants import TWO_SIDED_95
 from strapdown.errors import ConfigError
+from strapdown.lazy_names import named
 
 Table = dict[str, Any]
 
@@ -106,20 +106,14 @@ def with_value(table: Table, path: KeyPath, value: Any) -> Table:
     return out
 
 
-def _named(name: str) -> Any:
-    """What a module of the package defines, imported when it is wanted: ``module:name``."""
-    module, _, attribute = name.partition(":")
-    return getattr(import_module(f"strapdown.{module}"), attribute)
-
-
 def _by_form(form: str, run: str) -> Callable[[Table, str], Any]:
-    """The run of a configuration file of a form, each as `_named`."""
-    return lambda table, name: _named(run)(_named(form).checked({**table, "name": name}))
+    """The run of a configuration file of a form, each as `named`."""
+    return lambda table, name: named(run)(named(form).checked({**table, "name": name}))
 
 
 def _from_result(data: str) -> Callable[[Any], Table]:
-    """The plain data of a result by a function, as `_named`."""
-    return lambda run: dict(_named(data)(run))
+    """The plain data of a result by a function, as `named`."""
+    return lambda run: dict(named(data)(run))
 
 
 # --- navigation and alignment -------------------------------------------------------------
@@ -460,10 +454,13 @@ KINDS: dict[str, Kind] = {
         ("log", "path"),
         _navigation_curves,
         ("horizontal_error_m", "horizontal_sd_m", "height_error_m", "heading_error_deg"),
-        view=lambda run: _named("report.navigation_evaluation:NavigationEvaluation")(run),
+        view=lambda run: named("strapdown.report.navigation_evaluation:NavigationEvaluation")(run),
     ),
     "align": Kind(
-        _by_form("config.alignment:AlignmentSpec", "systems.alignment_run:run_alignment"),
+        _by_form(
+            "strapdown.config.alignment:AlignmentSpec",
+            "strapdown.systems.alignment_run:run_alignment",
+        ),
         _alignment_data,
         {
             **_ends(("roll", "pitch", "heading"), "deg"),
@@ -487,7 +484,7 @@ KINDS: dict[str, Kind] = {
     ),
     "outage": Kind(
         _outage,
-        _from_result("report.outage:outage_parts"),
+        _from_result("strapdown.report.outage:outage_parts"),
         {
             key: f"at_the_end.{key}"
             for key in (
@@ -515,13 +512,15 @@ KINDS: dict[str, Kind] = {
         save=_save_crash,
     ),
     "calibrate": Kind(
-        _by_form("config.logs:CalibrateSpec", "systems.calibrate_run:run_calibrate"),
-        _from_result("report.calibrate:calibrate_json"),
+        _by_form(
+            "strapdown.config.logs:CalibrateSpec", "strapdown.systems.calibrate_run:run_calibrate"
+        ),
+        _from_result("strapdown.report.calibrate:calibrate_json"),
         {"rests": "rests", "excess": "excess"},
         log=("logs", 0, "path"),
     ),
     "doctor": Kind(
-        _by_form("config.logs:DoctorSpec", "systems.doctor:run_doctor"),
+        _by_form("strapdown.config.logs:DoctorSpec", "strapdown.systems.doctor:run_doctor"),
         _doctor_data,
         {
             key: f"log.{key}"

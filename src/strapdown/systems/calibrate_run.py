@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle import InputFiles, Seal, input_files, sensor_file
+from strapdown.bundle import InputFiles, input_files, sensor_file
 from strapdown.config.logs import AxesTable, CalibrateSpec, KnownTurn, LogTable
 from strapdown.config.toml_text import string
 from strapdown.earth import gravity
@@ -77,6 +77,8 @@ class CalibrateRun(SavedRun):
     findings : tuple of Finding
     """
 
+    bundle = "strapdown.report.calibrate:CALIBRATE"
+
     configuration: ClassVar[str] = "spec"
 
     spec: CalibrateSpec
@@ -134,12 +136,6 @@ class CalibrateRun(SavedRun):
         if chart is None:
             raise DataError("calibrate.magnetometer-alone", quantity="calibration")
         return ChartFigure(chart)
-
-    @staticmethod
-    def _writer() -> Callable[..., Seal]:
-        from strapdown.report.calibrate import CALIBRATE
-
-        return CALIBRATE.write
 
     def __repr__(self) -> str:
         found = self.calibration

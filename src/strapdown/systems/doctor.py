@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown import rotation
-from strapdown.bundle import InputFiles, Seal, log_files
+from strapdown.bundle import InputFiles, log_files
 from strapdown.config.logs import (
     AxesTable,
     DoctorSpec,
@@ -162,6 +162,8 @@ class Diagnosis(SavedRun):
         Questions, faults and notes of every log, and `between`.
     """
 
+    bundle = "strapdown.report.doctor:DOCTOR"
+
     configuration: ClassVar[str] = "spec"
 
     spec: DoctorSpec
@@ -180,12 +182,6 @@ class Diagnosis(SavedRun):
         """One row per stream: log, name, rows, first and last stamp in s, rate in Hz."""
         rows = [{"log": log.name, **one} for log in self.logs for one in log.data["streams"]]
         return pd.DataFrame(rows)
-
-    @staticmethod
-    def _writer() -> Callable[..., Seal]:
-        from strapdown.report.doctor import DOCTOR
-
-        return DOCTOR.write
 
     def __repr__(self) -> str:
         said = "; ".join(

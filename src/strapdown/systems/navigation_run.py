@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine import FineResult
 from strapdown.alignment.gnss_course import GnssCourse
-from strapdown.bundle import InputFiles, Seal
+from strapdown.bundle import InputFiles
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import (
     CoarseModeSpec,
@@ -737,6 +737,8 @@ class NavigationRun(SavedRun):
         Tables that are given in memory; files of the bundle.
     """
 
+    bundle = "strapdown.report.navigation:NAVIGATION"
+
     spec: NavigationSpec
     source: NavigationSource
     ellipsoid: Ellipsoid
@@ -829,12 +831,6 @@ class NavigationRun(SavedRun):
         from strapdown.report.navigation import plot
 
         return plot(self, kind)
-
-    @staticmethod
-    def _writer() -> Callable[..., Seal]:
-        from strapdown.report.navigation import NAVIGATION
-
-        return NAVIGATION.write
 
     def __repr__(self) -> str:
         time, smoothed = self.trajectory.index, "" if self.forward is None else ", smoothed"
