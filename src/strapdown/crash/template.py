@@ -598,8 +598,7 @@ class Unit:
 
     def against_gravity(self) -> Finding:
         """Return the finding that gravity at rest contradicts the stated axes."""
-        data = {"axes": self.axes_stated, "unit": self.name}
-        return Finding("crash.axes-against-gravity", severity="warning", data=data)
+        return Finding("crash.axes-against-gravity", axes=self.axes_stated, unit=self.name)
 
     @property
     def place(self) -> str:

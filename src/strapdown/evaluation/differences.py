@@ -161,7 +161,6 @@ def rotation_contradicted(imu: pd.DataFrame, reference: pd.DataFrame) -> Finding
     return Finding(
         "evaluation.reference-rotates-otherwise",
         quantity="reference",
-        severity="warning",
         gyro_deg_s=float(np.degrees(gyro)),
         reference_deg_s=float(np.degrees(other)),
         windows=angles.shape[1],

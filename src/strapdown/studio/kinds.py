@@ -286,11 +286,7 @@ def _draft_crash(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
         stated[record.path] = StatedReading(axes=own_axes or "", **taken)
         if left := [k for k in of_each(own)[0] if k not in taken and k not in PART]:
             name = record.path.as_posix()
-            beside.append(
-                Finding(
-                    "studio.reading-not-used", severity="warning", file=name, data={"keys": left}
-                )
-            )
+            beside.append(Finding("studio.reading-not-used", file=name, data={"keys": left}))
     begin, end = keys.get("from_s"), keys.get("to_s")
     part: tuple[Finding, ...] = ()
     if begin is not None or end is not None:
@@ -460,7 +456,6 @@ def _draft_of_options(table: str, what: str, example: Iterable[tuple[str, str, s
         findings = [
             Finding(
                 "studio.read-as-the-first",
-                severity="warning",
                 file=one.as_posix(),
                 data={"first": first.as_posix()},
             )

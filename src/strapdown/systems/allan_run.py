@@ -373,7 +373,7 @@ def _temperature(log: LogTable, recording: Recording, stamps: Array) -> Array | 
 
 
 def _said(code: str, name: str, **data: Any) -> Finding:
-    return Finding(code, severity="warning", file=name, data=data)
+    return Finding(code, file=name, data=data)
 
 
 def _limits(

@@ -360,16 +360,16 @@ def _said(found: ImuCalibration, spec: CalibrateSpec, name: str) -> Iterable[Fin
             code = "calibrate.not-observed-both"
         elif data["turns"]:
             code = "calibrate.not-observed-turns"
-        yield Finding(code, severity="warning", file=name, data=data)
+        yield Finding(code, file=name, data=data)
     if spec.lat_deg is None and spec.gravity_m_per_s2 is None:
         percent = 100.0 * GRAVITY_SD / GRAVITY
         yield Finding("calibrate.gravity", severity="note", file=name, data={"percent": percent})
     if found.excess["accel"] > LARGE_EXCESS:
         mg = found.excess["accel"] / 9.80665e-3
-        yield Finding("calibrate.rests-disagree", severity="warning", file=name, data={"mg": mg})
+        yield Finding("calibrate.rests-disagree", file=name, data={"mg": mg})
     if found.excess["turns"] > LARGE_TILT:
         deg = found.excess["turns"] / DEG
-        yield Finding("calibrate.turns-disagree", severity="warning", file=name, data={"deg": deg})
+        yield Finding("calibrate.turns-disagree", file=name, data={"deg": deg})
 
 
 def _poses(remedies: Sequence[str]) -> list[str]:

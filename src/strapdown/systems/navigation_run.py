@@ -481,7 +481,6 @@ def _recovered(
         findings = (
             Finding(
                 "navigation.run-again-with-noise",
-                severity="warning",
                 quantity="position",
                 count=len(wrong),
                 begin=min(one.begin for one in wrong),
