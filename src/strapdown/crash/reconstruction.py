@@ -43,7 +43,7 @@ from strapdown.crash.events import (
 from strapdown.crash.measuring_point import PointKinematics
 from strapdown.crash.path import VELOCITY, CrashPath, path_line, reconstruct_path
 from strapdown.crash.preparation import prepare_together
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_warning
 from strapdown.mechanization import NorthEastDown
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.synchronise import SynchronisedUnits, synchronise
@@ -343,13 +343,12 @@ def reconstruct_unit(
     blind = [axis for axis in at_point.assumed_axes if axis in ("forward", "right")]
     if blind and not events.events:
         # An impact along an assumed axis is not among the events.
-        findings.append(
-            Finding(
-                "crash.impact-along-would-not-show",
-                file=at_point.name,
-                quantity="delta-V",
-                blind=blind,
-            )
+        add_warning(
+            findings,
+            "crash.impact-along-would-not-show",
+            file=at_point.name,
+            quantity="delta-V",
+            blind=blind,
         )
     for k, event in enumerate(events.events):
         between = (
@@ -359,14 +358,13 @@ def reconstruct_unit(
         contact = find_contact(acceleration, event, options.rule, noise=noise, between=between)
         start, end = contact.start.time, contact.end.time
         if end > at_point.assumed_until:
-            findings.append(
-                Finding(
-                    "crash.event-beyond-assumed-turning",
-                    file=at_point.name,
-                    quantity="delta-V",
-                    end=end,
-                    until=at_point.assumed_until,
-                )
+            add_warning(
+                findings,
+                "crash.event-beyond-assumed-turning",
+                file=at_point.name,
+                quantity="delta-V",
+                end=end,
+                until=at_point.assumed_until,
             )
         low = min(start + peak_window, end)
         peak = trailing_delta_v(acceleration, peak_window, low, end).peak
@@ -394,15 +392,14 @@ def reconstruct_unit(
         over, of_event = changes
         together = math.hypot(over.resultant_bound, of_event.resultant_bound)
         if not of_event.at_least and over.resultant - of_event.resultant > together:
-            findings.append(
-                Finding(
-                    "crash.window-exceeds-event",
-                    file=at_point.name,
-                    quantity="delta-V",
-                    length=1e3 * peak_window,
-                    peak=over.resultant,
-                    whole=of_event.resultant,
-                )
+            add_warning(
+                findings,
+                "crash.window-exceeds-event",
+                file=at_point.name,
+                quantity="delta-V",
+                length=1e3 * peak_window,
+                peak=over.resultant,
+                whole=of_event.resultant,
             )
         if changes[1].at_least:
             findings.append(_at_least(changes[1], at_point.name))
@@ -424,16 +421,15 @@ def reconstruct_unit(
             ned.append(EventChanges(changes[0], changes[1], contact))
         else:
             ned.append(None)
-            findings.append(
-                Finding(
-                    "crash.event-not-within-path-change",
-                    file=at_point.name,
-                    quantity="window",
-                    start=start,
-                    end=end,
-                    time=path.time[0],
-                    time_2=path.time[-1],
-                )
+            add_warning(
+                findings,
+                "crash.event-not-within-path-change",
+                file=at_point.name,
+                quantity="window",
+                start=start,
+                end=end,
+                time=path.time[0],
+                time_2=path.time[-1],
             )
     # An assumed roll gives no information on a rollover.
     roll = None
@@ -535,15 +531,14 @@ def entry_findings(
     # is at the end of the window, and the first contact up to one window after time zero.
     if events.events and events.events[0].time_zero + events.rule.wake_window < entry.time:
         first = events.events[0].time_zero
-        found.append(
-            Finding(
-                "crash.stated-crash-began-ms-before",
-                file=at_point.name,
-                quantity="entry",
-                time=entry.time,
-                time_2=1000.0 * (entry.time - first),
-                first=first,
-            )
+        add_warning(
+            found,
+            "crash.stated-crash-began-ms-before",
+            file=at_point.name,
+            quantity="entry",
+            time=entry.time,
+            time_2=1000.0 * (entry.time - first),
+            first=first,
         )
         # Its speed may differ from that at the beginning.
         return found
@@ -563,18 +558,17 @@ def entry_findings(
     speed, sd = _speed(path, k)
     felt, felt_sd = _speed(driven, j)
     if abs(speed - felt) > SIGMAS * float(np.hypot(sd, felt_sd)):
-        found.append(
-            Finding(
-                "crash.rest-until-record-itself-comes",
-                file=at_point.name,
-                quantity="entry speed",
-                speed=speed,
-                sd=1.96 * sd,
-                time=entry.time,
-                end=rest.end,
-                felt=felt,
-                felt_sd=1.96 * felt_sd,
-            )
+        add_warning(
+            found,
+            "crash.rest-until-record-itself-comes",
+            file=at_point.name,
+            quantity="entry speed",
+            speed=speed,
+            sd=1.96 * sd,
+            time=entry.time,
+            end=rest.end,
+            felt=felt,
+            felt_sd=1.96 * felt_sd,
         )
     return found
 
@@ -782,8 +776,8 @@ def _reconstructed(
         findings += [*comparison.findings, *hidden]
         if combine and not comparison.agree:
             names = ", ".join(u.name for u in there)
-            findings.append(
-                Finding("crash.units-disagree-no-mean-told", file=names, quantity="combine")
+            add_warning(
+                findings, "crash.units-disagree-no-mean-told", file=names, quantity="combine"
             )
     x, y, z = (float(v) for v in point)
     return CrashReconstruction(

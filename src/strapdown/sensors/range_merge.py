@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY, Flags
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_warning
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.pre_crash import BiasEstimate
 from strapdown.sensors.rest import sd_of_mean
@@ -244,14 +244,13 @@ def agreement_findings(unit: CrashUnit, ranges: Sequence[Range]) -> list[Finding
         clear = np.asarray(~(below.limits.clipped | above.limits.clipped).any(axis=1))
         clear[1:-1] &= clear[:-2] & clear[2:]
         if int(clear.sum()) < LEAST_SAMPLES:
-            found.append(
-                Finding(
-                    "sensors.samples-both-clear-their-ends",
-                    file=source,
-                    quantity="accel",
-                    clear=int(clear.sum()),
-                    name=low.name,
-                )
+            add_warning(
+                found,
+                "sensors.samples-both-clear-their-ends",
+                file=source,
+                quantity="accel",
+                clear=int(clear.sum()),
+                name=low.name,
             )
             continue
         upper, lower = above.values[clear], below.values[clear]
@@ -276,17 +275,16 @@ def agreement_findings(unit: CrashUnit, ranges: Sequence[Range]) -> list[Finding
                 code = "sensors.range-follows-other-axis"
             else:
                 code, column = "sensors.range-does-not-follow", row
-            found.append(
-                Finding(
-                    code,
-                    file=source,
-                    quantity=f"accel_{axis}",
-                    name=low.name,
-                    axis="xyz"[column],
-                    sign=sign,
-                    ratio=matrix[row, column],
-                    sd=sd[row, column],
-                )
+            add_warning(
+                found,
+                code,
+                file=source,
+                quantity=f"accel_{axis}",
+                name=low.name,
+                axis="xyz"[column],
+                sign=sign,
+                ratio=matrix[row, column],
+                sd=sd[row, column],
             )
     return found
 

@@ -25,7 +25,15 @@ from strapdown.config.logs import (
 )
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.samples import running_integral, white_sd
-from strapdown.errors import ConfigError, DataError, Finding, Severity, StrapdownError
+from strapdown.errors import (
+    ConfigError,
+    DataError,
+    Finding,
+    Severity,
+    StrapdownError,
+    add_note,
+    add_warning,
+)
 from strapdown.evaluation.differences import rotation_contradicted
 from strapdown.formats import (
     READERS,
@@ -650,30 +658,27 @@ def _between(logs: Sequence[LogDiagnosis]) -> list[Finding]:
             try:
                 fit = align_second_log(base.streams["imu"], other.streams["imu"])
             except DataError as error:
-                found.append(
-                    Finding(
-                        "doctor.logs-not-aligned",
-                        severity="note",
-                        file=base.name,
-                        quantity="time",
-                        other=other.name,
-                        reason=error.finding,
-                    )
-                )
-                continue
-            apart = abs(fit.offset) > max(3.0 * fit.offset_sd, 0.02)
-            found.append(
-                Finding(
-                    "doctor.logs-apart" if apart else "doctor.logs-on-one-clock",
-                    severity="warning" if apart else "note",
-                    offset=fit.offset,
-                    sd=fit.offset_sd,
-                    drift_ppm=fit.drift_ppm,
-                    drift_sd_ppm=fit.drift_sd_ppm,
+                add_note(
+                    found,
+                    "doctor.logs-not-aligned",
                     file=base.name,
                     quantity="time",
                     other=other.name,
+                    reason=error.finding,
                 )
+                continue
+            apart = abs(fit.offset) > max(3.0 * fit.offset_sd, 0.02)
+            add_warning(
+                found,
+                "doctor.logs-apart" if apart else "doctor.logs-on-one-clock",
+                severity="warning" if apart else "note",
+                offset=fit.offset,
+                sd=fit.offset_sd,
+                drift_ppm=fit.drift_ppm,
+                drift_sd_ppm=fit.drift_sd_ppm,
+                file=base.name,
+                quantity="time",
+                other=other.name,
             )
     return found
 
@@ -999,15 +1004,14 @@ def _navigation(one: LogDiagnosis) -> list[Finding]:
     sd = values_of(gnss, POSITION_SD)[:, 0]
     finite = sd[np.isfinite(sd)]
     assumed = "position_sd_taken" in gnss.attrs
-    found.append(
-        Finding(
-            "doctor.fixes-without-sd" if assumed else "doctor.fixes",
-            severity="warning" if assumed else "note",
-            file=one.name,
-            count=inside.size,
-            percent=100.0 * float(inside[-1] - inside[0]) / float(stamps[-1] - stamps[0]),
-            sd=float(np.median(finite)) if finite.size else math.inf,
-        )
+    add_warning(
+        found,
+        "doctor.fixes-without-sd" if assumed else "doctor.fixes",
+        severity="warning" if assumed else "note",
+        file=one.name,
+        count=inside.size,
+        percent=100.0 * float(inside[-1] - inside[0]) / float(stamps[-1] - stamps[0]),
+        sd=float(np.median(finite)) if finite.size else math.inf,
     )
     listed = [f for f in one.faults if f.code.startswith("navigation.") or f.code in _LIMITS]
     found += [f for f in listed if f not in found]
@@ -1039,15 +1043,14 @@ def _crash(one: LogDiagnosis) -> list[Finding]:
         return [*found, _without_force(one, "doctor.no-specific-force", "error")]
     change = impact["delta_v_m_per_s"]
     hit = change >= EVENT_DV
-    found.append(
-        Finding(
-            "doctor.impact" if hit else "doctor.no-impact",
-            severity="warning" if hit else "error",
-            file=one.name,
-            delta_v=3.6 * change,
-            at=impact["at_s"],
-            peak=impact["largest_m_per_s2"] / STANDARD_GRAVITY,
-        )
+    add_warning(
+        found,
+        "doctor.impact" if hit else "doctor.no-impact",
+        severity="warning" if hit else "error",
+        file=one.name,
+        delta_v=3.6 * change,
+        at=impact["at_s"],
+        peak=impact["largest_m_per_s2"] / STANDARD_GRAVITY,
     )
     rate = _rate(one)
     if rate < 0.99 * EVENT_RATE:

@@ -30,7 +30,7 @@ from strapdown.config.navigation import (
 )
 from strapdown.constants import Triple
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
-from strapdown.errors import DivergenceError, Finding, StrapdownError
+from strapdown.errors import DivergenceError, Finding, StrapdownError, add_note
 from strapdown.estimation.robust import DOUBT
 from strapdown.evaluation.trajectory_differences import (
     DifferenceSummary,
@@ -396,14 +396,12 @@ def _with_offsets(
             error, sd = (float(of[name].iloc[-1]) for of in (record.sensors, record.sensors_sd))
             if abs(error) > max(CONTINUED, SURELY * sd):
                 aid = replace(aid, time_offset=aid.time_offset - error)
-                findings.append(
-                    Finding(
-                        "navigation.run-again-with-offset",
-                        severity="note",
-                        quantity=name,
-                        offset=aid.time_offset,
-                        sd=sd,
-                    )
+                add_note(
+                    findings,
+                    "navigation.run-again-with-offset",
+                    quantity=name,
+                    offset=aid.time_offset,
+                    sd=sd,
                 )
         aids.append(aid)
     if findings:
@@ -435,14 +433,12 @@ def _with_known_offsets(
             if known is not None and displaced > DISPLACED * aid.position_sd_factor * fix:
                 error, sd = known
                 aid = replace(aid, time_offset=aid.time_offset - error, time_offset_sd=sd)
-                findings.append(
-                    Finding(
-                        "navigation.run-again-with-known-offset",
-                        severity="note",
-                        quantity=name,
-                        offset=aid.time_offset,
-                        sd=sd,
-                    )
+                add_note(
+                    findings,
+                    "navigation.run-again-with-known-offset",
+                    quantity=name,
+                    offset=aid.time_offset,
+                    sd=sd,
                 )
         aids.append(aid)
     if findings:
