@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -15,12 +16,11 @@ from strapdown.sensors.calibration import (
     CalibrationRecord,
     KnownRotation,
     calibrate_imu,
-    in_accel_axes,
 )
 from strapdown.sensors.calibration_model import PRIOR
 from strapdown.sensors.error_chain import apply
 from strapdown.sensors.rest import find_rests
-from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
+from strapdown.sensors.triad_errors import ImuErrors, TriadErrors, matrix_of, triad_of
 from strapdown.sensors.uncertainty import draw_errors
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.imu import imu_of_columns
@@ -194,6 +194,40 @@ def rate_table(errors, seed):
         rests = tuple(r for r in made.rests if r.end < 8.0 or r.start > 55.9)
         records.append(replace(made, rests=rests))
     return records, known, {}
+
+
+def in_accel_axes(errors: ImuErrors) -> ImuErrors:
+    """Errors in axes in which the misalignment of the accelerometers is symmetric.
+
+    The readings are the same: a rotation of the body axes is moved from one matrix to the other.
+    """
+    accel = errors.accel or TriadErrors()
+    A = np.eye(3) + np.asarray(accel.misalignment)
+    G = np.eye(3) + np.asarray(errors.gyro.misalignment)
+    scale_a, scale_g = (
+        1.0 + np.array(accel.axis("scale")),
+        1.0 + np.array(errors.gyro.axis("scale")),
+    )
+    K, W = scale_a[:, None] * A, scale_g[:, None] * G
+    S = np.asarray(errors.gyro.g_sensitivity) * scale_g[:, None]
+    for _ in range(20):
+        own = K / np.diag(K)[:, None]
+        skew = 0.5 * (own - own.T)
+        turn = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
+        R = rotation.dcm_from_rotation_vector(-turn)
+        K, W, S = K @ R, W @ R, S @ R
+        if np.abs(turn).max() < 1e-15:
+            break
+    parts: list[dict[str, Any]] = []
+    for matrix in (K, W):
+        scale = np.diag(matrix)
+        own = matrix / scale[:, None]
+        np.fill_diagonal(own, 0.0)
+        parts.append({"scale": triad_of(scale - 1.0), "misalignment": matrix_of(own)})
+    sensitivity = matrix_of(S / np.diag(W)[:, None])
+    return ImuErrors(
+        replace(errors.gyro, g_sensitivity=sensitivity, **parts[1]), replace(accel, **parts[0])
+    )
 
 
 PROCEDURES = {

@@ -1,8 +1,16 @@
-"""Physical constants, each with its source."""
+"""Physical constants, each with its source, and the types of arrays."""
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+Triple = tuple[float, float, float]
 
 #: Conventional standard acceleration of gravity, m/s² (3rd CGPM, 1901, Resolution 2).
 STANDARD_GRAVITY = 9.80665

@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels import earth as kernel
+from strapdown.constants import Array
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError
-
-Array = NDArray[np.float64]
 
 # Deeper, normals to the ellipsoid intersect; beyond the upper limit a number is not a height.
 _DEEPEST, _HIGHEST = -1e6, 1e9  # m

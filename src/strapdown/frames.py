@@ -13,15 +13,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown._kernels import earth as kernel
+from strapdown.constants import Array
 from strapdown.earth import earth_rate, refuse, rows
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError
-
-Array = NDArray[np.float64]
 
 #: Valid distances of a point in ECEF from the center of the Earth, m. Nearer, more than one normal
 #: to the ellipsoid goes through it.

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels import increments as angle_kernel
 from strapdown._kernels import motion_increments as kernel
+from strapdown.constants import Array
 from strapdown.errors import ConfigError, DataError, check_choice
 from strapdown.tables import (
     ACCEL,
@@ -30,7 +31,6 @@ from strapdown.tables.checks import (
     view_of,
 )
 
-Array = NDArray[np.float64]
 #: Of rates at the stamps.
 BETWEEN_STAMPS = ("linear", "cubic")
 #: `constant` applies to mean samples only.

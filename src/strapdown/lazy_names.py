@@ -13,12 +13,13 @@ def load_on_first_use(package: str, homes: Mapping[str, str]) -> None:
     """Let a package export names of its modules without importing these.
 
     `package`: ``__name__`` of the package that calls this. `homes`: module within the package, and
-    the names that it gives, separated by spaces.
+    the names that it gives, separated by spaces; they are its ``__all__``, if it states none.
     """
     module = sys.modules[package]
     module.__dict__["_homes"] = {
         name: home for home, names in homes.items() for name in names.split()
     }
+    module.__dict__.setdefault("__all__", sorted(module.__dict__["_homes"]))
     module.__class__ = _Lazy
 
 
@@ -40,6 +41,12 @@ class _Lazy(ModuleType):
         return sorted({*self.__dict__, *self.__dict__["_homes"]})
 
 
+def named(home: str) -> Any:
+    """Return what a module defines, imported now: ``module:name``."""
+    module, _, name = home.partition(":")
+    return getattr(import_module(module), name)
+
+
 class Choices(MutableMapping[str, Any]):
     """A literal table of choices, of which a run loads those that it takes.
 
@@ -51,8 +58,7 @@ class Choices(MutableMapping[str, Any]):
 
     def __getitem__(self, name: str) -> Any:
         if name not in self._loaded:
-            home, _, attribute = self._homes[name].partition(":")
-            self._loaded[name] = getattr(import_module(home), attribute)
+            self._loaded[name] = named(self._homes[name])
         return self._loaded[name]
 
     def __setitem__(self, name: str, entry: Any) -> None:

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown._kernels.ned import nav_numbers
+from strapdown.constants import Array
 from strapdown.errors import DataError
 from strapdown.tables import EULER, check_trajectory, places_of, trajectory_table
 from strapdown.tables.checks import is_number
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,10 +25,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown._kernels import rotation as kernel
 from strapdown._kernels.increments import LARGEST
+from strapdown.constants import Array
 from strapdown.errors import DataError
 
 __all__ = [
@@ -56,8 +57,6 @@ __all__ = [
     "unit_rotation_angle",
     "within_half_turn",
 ]
-
-Array = NDArray[np.float64]
 
 #: From east-north-up to north-east-down: half a turn about the diagonal of north and east.
 Q_NED_ENU = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)

@@ -16,7 +16,7 @@ from strapdown.bundle.signature import new_key, sign, signatures, signer_of
 from strapdown.errors import ConfigError, DataError
 from strapdown.report import verify as module
 from strapdown.report.content import compare_files, same_text
-from strapdown.report.verification_page import verification_page
+from strapdown.report.verify import verification_page
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.inertial_sums import InertialSums, sum_inertially
+from strapdown.constants import Indices
 from strapdown.errors import DataError
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
 from strapdown.sensors.rest import RestStretch, find_rests_of_every_grade, rest_between
@@ -27,8 +28,6 @@ from strapdown.tables import (
     usable,
 )
 from strapdown.tables.checks import Array, source_of
-
-Indices = NDArray[np.int64]
 
 #: The rate at an instant is a mean over so much before and after it, s: little against the swaying
 #: of a vehicle, which its antenna follows.

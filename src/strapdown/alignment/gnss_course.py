@@ -44,7 +44,7 @@ from strapdown.alignment.course_sums import (
     rest_rates,
 )
 from strapdown.alignment.record_checks import check_record
-from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
+from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY, Indices
 from strapdown.dsp.samples import running_integral
 from strapdown.earth import transport_rate
 from strapdown.errors import ConfigError, DataError, Finding
@@ -900,7 +900,6 @@ def _level_rate(velocity: Array, site: Site) -> Array:
 
 # Initial attitude of a drive: over a short end of the record first, then over more.
 
-Indices = NDArray[np.int64]
 
 # Attitude error by a bias over the part that is solved, rad, one standard deviation: the second
 # order is a hundredth.

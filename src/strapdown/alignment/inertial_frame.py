@@ -26,7 +26,7 @@ from strapdown.alignment.record_checks import (
 from strapdown.constants import DEG_PER_HOUR
 from strapdown.dsp.chi_square import chi_square_exceeded
 from strapdown.earth import earth_rate
-from strapdown.errors import DataError, Finding, check_choice
+from strapdown.errors import DataError, Finding, add_warning, check_choice
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import GYRO
 from strapdown.tables.checks import Array, source_of
@@ -85,16 +85,15 @@ class InertialFrame(CoarseAlignment):
         sd = np.sqrt(np.maximum(np.diagonal(whole), 0.0))
         _refuse_travel(noise, sd, imu, site, findings)
         if noise.significant:
-            findings.append(
-                Finding(
-                    "alignment.unexplained-slow-motion",
-                    file=source,
-                    quantity="accel",
-                    ratio=noise.ratio,
-                    length=sums.length,
-                    sway=noise.sway,
-                    sd_deg=np.degrees(sd[2]),
-                )
+            add_warning(
+                findings,
+                "alignment.unexplained-slow-motion",
+                file=source,
+                quantity="accel",
+                ratio=noise.ratio,
+                length=sums.length,
+                sway=noise.sway,
+                sd_deg=np.degrees(sd[2]),
             )
         findings += still_by_gnss(gnss, imu, site, float(sd[2]))
         findings += turn_findings(sums, fit.C_nb, site, sensors, source)

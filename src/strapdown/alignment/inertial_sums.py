@@ -6,14 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from strapdown.constants import Indices
 from strapdown.increments import motion_increments
 from strapdown.tables import DV, MOTION, values_of
 from strapdown.tables.checks import Array
-
-Indices = NDArray[np.int64]
-
 
 # Nodes over which sensor errors are taken as constant: alignment depends on changes over a fifth of
 # the record and more, and the weight of a node of a 240th is accurate to 1e-4.

@@ -22,7 +22,7 @@ from strapdown.alignment.mean_errors import (
 )
 from strapdown.alignment.record_checks import check_gravity, check_record, gravity_findings
 from strapdown.ellipsoids import WGS84
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_warning
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import GYRO
 from strapdown.tables.checks import Array, is_number, source_of
@@ -152,18 +152,17 @@ def level_at_rest(
         if turning > 1.0 and followed:
             blocks, turned, turned_sd = _held(imu, sensors, means, swing)
             mean, swing = blocks.mean(axis=0), np.zeros((3, 3))
-        findings.append(
-            Finding(
-                "alignment.specific-force-scatters",
-                file=source,
-                quantity="accel",
-                blocks=BLOCKS,
-                length=means.length / BLOCKS,
-                loud=loud,
-                turning=turning,
-                in_bound=True,
-                swing_deg=math.degrees(size),
-            )
+        add_warning(
+            findings,
+            "alignment.specific-force-scatters",
+            file=source,
+            quantity="accel",
+            blocks=BLOCKS,
+            length=means.length / BLOCKS,
+            loud=loud,
+            turning=turning,
+            in_bound=True,
+            swing_deg=math.degrees(size),
         )
     roll, pitch = rotation.level(mean)
     C_nb = rotation.dcm_from_quaternion(rotation.quaternion_from_euler([roll, pitch, heading_deg]))

@@ -263,17 +263,17 @@ def _doubts(imu: pd.DataFrame) -> list[Finding]:
         if near.all() and felt < WEAKEST:
             data = {"rate": float(middle), "force": felt}
             code = "attitude.gyro-and-accel-exchanged"
-            return [Finding(code, quantity="gyro, accel", severity="warning", data=data)]
+            return [Finding(code, quantity="gyro, accel", data=data)]
     time = imu.index.to_numpy(dtype=np.float64)
     step = float(time[-1] - time[0]) / (len(imu) - 1)
     if (turn := float(np.median(rates)) * step) > TURN:
         data = {"turn": math.degrees(turn), "step": step}
-        return [Finding("attitude.turn-between-samples", severity="warning", data=data)]
+        return [Finding("attitude.turn-between-samples", data=data)]
     largest, share = float(rates.max()), float(np.mean(rates > FAST))
     if largest <= IMPOSSIBLE and share <= FAST_SHARE:
         return []
     data = {"largest": largest, "share": 100.0 * share, "fast": FAST}
-    return [Finding("attitude.rate-implausible", quantity="gyro", severity="warning", data=data)]
+    return [Finding("attitude.rate-implausible", quantity="gyro", data=data)]
 
 
 def _gyro_alone(t: Any, gyro: ArrayLike, sampling: str) -> pd.DataFrame:

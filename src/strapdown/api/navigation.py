@@ -13,7 +13,7 @@ from strapdown.api.reading import GnssFile, ImuFile, imu_input, keys_in, log_in,
 from strapdown.config.logs import FixesTable
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.spec import specify
-from strapdown.errors import ConfigError, Finding
+from strapdown.errors import ConfigError, Finding, add_warning
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_fixes import POSITION_SDS
 from strapdown.progress import Progress, silent
@@ -291,39 +291,36 @@ def _ask(
     taken = aid.get("position_sd_m") if fixes and fixes.get("position_sd_m") is None else None
     if taken is not None:
         file = Path(aid["path"]).name
-        open_.append(
-            Finding(
-                "api.fixes-without-sd",
-                severity="error",
-                file=file,
-                quantity=called("gnss"),
-                typical=POSITION_SDS,
-            )
+        add_warning(
+            open_,
+            "api.fixes-without-sd",
+            severity="error",
+            file=file,
+            quantity=called("gnss"),
+            typical=POSITION_SDS,
         )
         answers.append(f"--gnss-position-sd {taken:g}")
     coarse = proposal.table["coarse"]
     if coarse["kind"] == "known_heading" and "heading_deg" not in coarse:
-        open_.append(
-            Finding(
-                "api.no-heading",
-                severity="error",
-                quantity=called("heading"),
-                called=called("heading"),
-                called_2=called("gnss"),
-            )
+        add_warning(
+            open_,
+            "api.no-heading",
+            severity="error",
+            quantity=called("heading"),
+            called=called("heading"),
+            called_2=called("gnss"),
         )
         answers.append("--heading DEG")
     if "site" not in proposal.table and proposal.gnss is None:
-        open_.append(
-            Finding(
-                "api.no-initial-position",
-                severity="error",
-                quantity=called("lat"),
-                called=called("lat"),
-                called_2=called("lon"),
-                called_3=called("alt"),
-                called_4=called("gnss"),
-            )
+        add_warning(
+            open_,
+            "api.no-initial-position",
+            severity="error",
+            quantity=called("lat"),
+            called=called("lat"),
+            called_2=called("lon"),
+            called_3=called("alt"),
+            called_4=called("gnss"),
         )
         answers.append("--lat DEG --lon DEG --alt M")
     if not open_:

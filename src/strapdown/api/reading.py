@@ -461,7 +461,6 @@ def read(path: str | Path, **options: Any) -> Streams:
     left_out = [
         Finding(
             "api.stream-left-out",
-            severity="warning",
             file=Path(path).name,
             quantity=stream,
             reason=error.finding,

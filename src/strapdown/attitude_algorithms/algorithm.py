@@ -10,18 +10,17 @@ from typing import Any, ClassVar, NoReturn
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown._kernels import increments as increment_kernel
 from strapdown._kernels import rotation as kernel
 from strapdown._kernels.compilation import ARGUMENT_ERRORS
 from strapdown._kernels.increments import HEAD, LARGEST, MEAN, OPTIONS, SAMPLES, TIME
+from strapdown.constants import Array
 from strapdown.errors import DataError, DivergenceError
 from strapdown.tables import DTHETA, THETA, attitude_table, check_sampling_kind
 from strapdown.tables.checks import values_of
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown._kernels import arithmetic
 from strapdown._kernels.arithmetic import single_precision
-from strapdown.attitude_algorithms.algorithm import (
-    Array,
-    AttitudeAlgorithm,
-    Restarts,
-    pieces_of,
-)
-from strapdown.constants import CORTEX_M4F_CYCLES
+from strapdown.attitude_algorithms.algorithm import AttitudeAlgorithm, Restarts, pieces_of
+from strapdown.constants import CORTEX_M4F_CYCLES, Array
 from strapdown.tables import GYRO
 
 STEPS = 12

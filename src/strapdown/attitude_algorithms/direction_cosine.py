@@ -9,7 +9,8 @@ import numpy as np
 from strapdown import rotation
 from strapdown._kernels import attitude as kernel
 from strapdown._kernels import rotation as kernel_rotation
-from strapdown.attitude_algorithms.algorithm import Accuracy, Array, AttitudeAlgorithm
+from strapdown.attitude_algorithms.algorithm import Accuracy, AttitudeAlgorithm
+from strapdown.constants import Array
 from strapdown.errors import ConfigError
 
 

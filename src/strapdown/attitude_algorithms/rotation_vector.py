@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 
 from strapdown._kernels import rotation_vector as kernel
-from strapdown.attitude_algorithms.algorithm import Accuracy, Array, AttitudeAlgorithm
+from strapdown.attitude_algorithms.algorithm import Accuracy, AttitudeAlgorithm
+from strapdown.constants import Array
 from strapdown.errors import ConfigError, check_choice
 
 _COEFFICIENTS = {"auto": kernel.AUTO, "miller": kernel.MILLER, "fit": kernel.FIT}

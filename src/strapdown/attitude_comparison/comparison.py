@@ -65,7 +65,7 @@ from strapdown.attitude_comparison.sweep import (
 )
 from strapdown.bundle import InputFiles, Seal, check_destination, input_files
 from strapdown.config.sources import LogSpec
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_warning
 from strapdown.evaluation.differences import known_at, largest_differences
 from strapdown.evaluation.reference_points import SamePose, Score, score_references
 from strapdown.formats import read_log
@@ -401,14 +401,13 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
     scores += [s for run in runs for s in score_references(run, references, imu)]
     findings += judge(runs, imu, increments, scores, source)
     if clock.gaps and known is None and len(references):
-        findings.append(
-            Finding(
-                "attitude.gap-before-reference",
-                file=source.name,
-                quantity="reference",
-                count=len(clock.gaps),
-                lost=sum(gap.length for gap in clock.gaps),
-            )
+        add_warning(
+            findings,
+            "attitude.gap-before-reference",
+            file=source.name,
+            quantity="reference",
+            count=len(clock.gaps),
+            lost=sum(gap.length for gap in clock.gaps),
         )
     progress("sharing out the error", 0.2)
     shares = find_shares(algorithms, runs, grounds)

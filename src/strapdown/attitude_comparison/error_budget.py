@@ -90,11 +90,6 @@ class ErrorBudget:
         off = abs(self.delay_s - 0.5 * step)
         return self.clock_counts and off <= SIGNIFICANT * self.delay_sd
 
-    def left_without(self, part: str) -> float | None:
-        """Return the largest error in deg once a part is removed; None if it does not count."""
-        rows = self.parts[self.parts["part"] == part]
-        return None if rows.empty else float(rows["max_deg"].iloc[0])
-
 
 @dataclass(frozen=True)
 class Holding:

@@ -17,7 +17,7 @@ from strapdown.attitude_comparison.source import AttitudeSource
 from strapdown.bundle import input_files
 from strapdown.config.sources import ScenarioSpec
 from strapdown.constants import TWO_SIDED_95
-from strapdown.errors import ConfigError, DivergenceError, Finding
+from strapdown.errors import ConfigError, DivergenceError, Finding, add_note, add_warning
 from strapdown.evaluation.differences import error_angles, known_at
 from strapdown.evaluation.reference_points import (
     SamePose,
@@ -147,9 +147,7 @@ def gather_references(
         tilts = tilt_references(usable, levelled_from=usable[0] if levelled else None)
         if tilts.empty:
             rest = {"start": usable[0].start, "end": usable[0].end}
-            findings.append(
-                Finding("attitude.one-rest", file=source.name, quantity=asks, data=rest)
-            )
+            add_warning(findings, "attitude.one-rest", file=source.name, quantity=asks, data=rest)
         points = pd.concat([points, tilts], ignore_index=True) if len(points) else tilts
     return points, positions, same_pose_candidates(usable) if points.empty else ()
 
@@ -261,13 +259,12 @@ def judge(
     turn[[gap.sample - 1 for gap in find_gaps(runs[0].attitude.index)]] = 0.0
     largest = int(turn.argmax())
     if turn[largest] > LARGE_STEP:
-        findings.append(
-            Finding(
-                "attitude.single-step-turns-rate-says",
-                quantity="gyro",
-                turn_deg=np.degrees(turn[largest]),
-                index=increments.index[largest],
-            )
+        add_warning(
+            findings,
+            "attitude.single-step-turns-rate-says",
+            quantity="gyro",
+            turn_deg=np.degrees(turn[largest]),
+            index=increments.index[largest],
         )
     wrong = {}
     for score in scores:
@@ -287,15 +284,13 @@ def judge(
         covered = float(counted[-1] - counted[0])
         span = float(imu.index[-1]) - float(imu.index[0])
         if covered < 0.5 * span:
-            findings.append(
-                Finding(
-                    "attitude.covers-rest-nothing-known",
-                    file=source.name,
-                    quantity="truth",
-                    severity="note",
-                    covered=covered,
-                    span=span,
-                )
+            add_note(
+                findings,
+                "attitude.covers-rest-nothing-known",
+                file=source.name,
+                quantity="truth",
+                covered=covered,
+                span=span,
             )
     return findings
 
@@ -381,14 +376,12 @@ def _own_filters(
             if aiding == "gyro+accel":
                 q = _with_first_heading(q, imu.index, source)
             elif run.disturbed >= DISTURBED:
-                findings.append(
-                    Finding(
-                        "attitude.field-disturbed",
-                        file=source.name,
-                        quantity="mag",
-                        severity="note",
-                        share=run.disturbed,
-                    )
+                add_note(
+                    findings,
+                    "attitude.field-disturbed",
+                    file=source.name,
+                    quantity="mag",
+                    share=run.disturbed,
                 )
             attitude = attitude_table(imu.index.to_numpy(), q)
             scores, errors = _judged(label, attitude, source, imu, references, run.covariance)

@@ -16,6 +16,7 @@ from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.attitude_comparison.options import AttitudeSpec
 from strapdown.bundle import InputFiles, input_files, log_files, sensor_file
 from strapdown.config.sources import LogSpec, ScenarioSpec
+from strapdown.constants import Array
 from strapdown.earth import magnetic_field
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.evaluation.differences import attitude_at, error_angles, gyro_turns
@@ -31,8 +32,6 @@ from strapdown.tables.sample_clock import SampleClock, sample_clock
 
 if TYPE_CHECKING:
     from strapdown.simulation import ImuErrors
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

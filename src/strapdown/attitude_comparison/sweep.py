@@ -17,7 +17,7 @@ from strapdown.attitude_algorithms.cost import run_single, single_increments
 from strapdown.attitude_comparison.options import refuse_no_rate
 from strapdown.config.sources import LogSpec, ScenarioSpec
 from strapdown.dsp.chi_square import student_above, student_quantile
-from strapdown.errors import ConfigError, DivergenceError, Finding
+from strapdown.errors import ConfigError, DivergenceError, Finding, add_note
 from strapdown.evaluation.differences import Errors, Known, angles_to_errors
 from strapdown.evaluation.reference_points import reference_errors
 from strapdown.increments import increments_from_imu
@@ -216,15 +216,13 @@ def choose_factors(
         factors.add(factor)
         if abs(full / factor / rate - 1.0) > 0.02:
             nearest = "the log's own rate" if factor == 1 else f"what one sample in {factor} gives"
-            findings.append(
-                Finding(
-                    "attitude.hz-asked-hz",
-                    quantity="--rates",
-                    severity="note",
-                    rate=rate,
-                    full=full / factor,
-                    nearest=nearest,
-                )
+            add_note(
+                findings,
+                "attitude.hz-asked-hz",
+                quantity="--rates",
+                rate=rate,
+                full=full / factor,
+                nearest=nearest,
             )
     return tuple(sorted(factors))
 

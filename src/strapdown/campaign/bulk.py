@@ -24,7 +24,6 @@ from strapdown.attitude_algorithms import make_algorithm
 from strapdown.attitude_algorithms.algorithm import AttitudeAlgorithm
 from strapdown.campaign.kinds import crash_case
 from strapdown.campaign.kinds import scenario_of as written_scenario
-from strapdown.config.crash_case import CaseSpec
 from strapdown.config.motions import TrajectorySpec
 from strapdown.config.outage import OutageSpec
 from strapdown.config.sources import ScenarioSpec
@@ -254,14 +253,6 @@ def _by_name(end: pd.Series, *change: float) -> dict[str, float]:
         out |= {"delta_v_total_m_per_s": total, "delta_v_total_km_per_h": total / SPEEDS["km/h"]}
         out["pdof_deg"] = angle
     return out
-
-
-def bulk_crash(spec: CaseSpec, seed: int = 0) -> BulkCrash:
-    """Prepare many possible truths of a crash; its record is reconstructed once.
-
-    `spec`: with absolute paths. ConfigError, DataError, DivergenceError: as `run_case`.
-    """
-    return BulkCrash(reconstruct_case(spec).main, seed)
 
 
 # Attitude: units of one gyro triad along one motion, each integrated from the true attitude.
@@ -886,7 +877,7 @@ def bulk_cases(
         if "simulate" in own:
             own["simulate"] = {"seed": seed, **own["simulate"]}
         with crash_case(own, "case") as (case, _):
-            return bulk_crash(case, seed=seed)
+            return BulkCrash(reconstruct_case(case).main, seed)
     if kind == "outage":
         return bulk_outage(specify(OutageSpec, **table), ranges, seed)
     source, sensor = table.get("source"), table.get("sensor")

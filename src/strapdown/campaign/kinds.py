@@ -20,6 +20,7 @@ from strapdown.config.spec import specify
 from strapdown.config.toml_file import KeyPath, read_toml
 from strapdown.constants import TWO_SIDED_95
 from strapdown.errors import ConfigError
+from strapdown.lazy_names import named
 
 Table = dict[str, Any]
 
@@ -51,13 +52,15 @@ class Kind:
 
     run: Callable[[Table, str], Any]
     data: Callable[[Any], Table]
-    save: Callable[[Any, Path, bool], Any]
     scalars: Mapping[str, str]
     seed: KeyPath = ()
     log: KeyPath = ()
     curves: Callable[[Any], pd.DataFrame] | None = None
     curve_names: tuple[str, ...] = field(default=())
     view: Callable[[Any], Any] = field(default=lambda run: run)
+    save: Callable[[Any, Path, bool], Any] = field(
+        default=lambda run, out, force: run.save(out, force=force)
+    )
 
 
 # --- paths in plain data ------------------------------------------------------------------
@@ -103,8 +106,14 @@ def with_value(table: Table, path: KeyPath, value: Any) -> Table:
     return out
 
 
-def _save_run(run: Any, out: Path, force: bool) -> Any:
-    return run.save(out, force=force)
+def _by_form(form: str, run: str) -> Callable[[Table, str], Any]:
+    """The run of a configuration file of a form, each as `named`."""
+    return lambda table, name: named(run)(named(form).checked({**table, "name": name}))
+
+
+def _from_result(data: str) -> Callable[[Any], Table]:
+    """The plain data of a result by a function, as `named`."""
+    return lambda run: dict(named(data)(run))
 
 
 # --- navigation and alignment -------------------------------------------------------------
@@ -130,12 +139,6 @@ def _proposed(table: Table) -> Table:
         gnss=None if fixes is None else specify(FixesTable, **fixes),
     )
     return proposal.table
-
-
-def _navigation_view(run: Any) -> Any:
-    from strapdown.report.navigation_evaluation import NavigationEvaluation
-
-    return NavigationEvaluation(run)
 
 
 def _navigation_data(evaluation: Any) -> Table:
@@ -184,13 +187,6 @@ def _navigation_curves(evaluation: Any) -> pd.DataFrame:
         },
         index=errors.time - begin,
     )
-
-
-def _align(table: Table, name: str) -> Any:
-    from strapdown.config.alignment import AlignmentSpec
-    from strapdown.systems.alignment_run import run_alignment
-
-    return run_alignment(AlignmentSpec.checked({**table, "name": name}))
 
 
 def _alignment_data(run: Any) -> Table:
@@ -267,35 +263,9 @@ def _outage(table: Table, name: str) -> Any:
     return run_outage(specify(OutageSpec, **table), budget=False)
 
 
-def _outage_data(run: Any) -> Table:
-    from strapdown.report.outage import outage_parts
-
-    return outage_parts(run)
-
-
 def _outage_curves(run: Any) -> pd.DataFrame:
     time, bound, _ = run.cone
     return pd.DataFrame({"horizontal_95_m": bound}, index=time - time[0])
-
-
-def _calibrate(table: Table, name: str) -> Any:
-    from strapdown.config.logs import CalibrateSpec
-    from strapdown.systems.calibrate_run import run_calibrate
-
-    return run_calibrate(CalibrateSpec.checked({**table, "name": name}))
-
-
-def _calibrate_data(run: Any) -> Table:
-    from strapdown.report.calibrate import calibrate_json
-
-    return calibrate_json(run)
-
-
-def _doctor(table: Table, name: str) -> Any:
-    from strapdown.config.logs import DoctorSpec
-    from strapdown.systems.doctor import run_doctor
-
-    return run_doctor(DoctorSpec.checked({**table, "name": name}))
 
 
 def _doctor_data(run: Any) -> Table:
@@ -468,7 +438,6 @@ KINDS: dict[str, Kind] = {
     "navigate": Kind(
         _navigate,
         _navigation_data,
-        _save_run,
         {
             **_ends(("north", "east", "down"), "m"),
             **_ends(("VN", "VE", "VD"), "m_per_s"),
@@ -485,12 +454,14 @@ KINDS: dict[str, Kind] = {
         ("log", "path"),
         _navigation_curves,
         ("horizontal_error_m", "horizontal_sd_m", "height_error_m", "heading_error_deg"),
-        _navigation_view,
+        view=lambda run: named("strapdown.report.navigation_evaluation:NavigationEvaluation")(run),
     ),
     "align": Kind(
-        _align,
+        _by_form(
+            "strapdown.config.alignment:AlignmentSpec",
+            "strapdown.systems.alignment_run:run_alignment",
+        ),
         _alignment_data,
-        _save_run,
         {
             **_ends(("roll", "pitch", "heading"), "deg"),
             "heading_sd_deg": "end.heading_sd_deg",
@@ -502,7 +473,6 @@ KINDS: dict[str, Kind] = {
     "attitude": Kind(
         _attitude,
         _attitude_data,
-        _save_run,
         {
             "final_deg": "first.error_deg",
             "rms_deg": "first.rms_deg",
@@ -514,8 +484,7 @@ KINDS: dict[str, Kind] = {
     ),
     "outage": Kind(
         _outage,
-        _outage_data,
-        _save_run,
+        _from_result("strapdown.report.outage:outage_parts"),
         {
             key: f"at_the_end.{key}"
             for key in (
@@ -529,7 +498,6 @@ KINDS: dict[str, Kind] = {
     "crash": Kind(
         _crash,
         _crash_data,
-        _save_crash,
         {
             **_ends(("delta_v", "delta_v_forward", "delta_v_right"), "m_per_s"),
             **_ends(("pdof",), "deg"),
@@ -541,18 +509,19 @@ KINDS: dict[str, Kind] = {
         ("simulate", "seed"),
         curves=_crash_curves,
         curve_names=("north_m", "east_m", "speed_m_per_s"),
+        save=_save_crash,
     ),
     "calibrate": Kind(
-        _calibrate,
-        _calibrate_data,
-        _save_run,
+        _by_form(
+            "strapdown.config.logs:CalibrateSpec", "strapdown.systems.calibrate_run:run_calibrate"
+        ),
+        _from_result("strapdown.report.calibrate:calibrate_json"),
         {"rests": "rests", "excess": "excess"},
         log=("logs", 0, "path"),
     ),
     "doctor": Kind(
-        _doctor,
+        _by_form("strapdown.config.logs:DoctorSpec", "strapdown.systems.doctor:run_doctor"),
         _doctor_data,
-        _save_run,
         {
             key: f"log.{key}"
             for key in (

@@ -113,7 +113,7 @@ def align(
     drifts and biases; the report states the uncertainty of each, its limits, and the alignment
     time.
     """
-    from strapdown.cli.console import WORDS, print_findings, print_seal
+    from strapdown.cli.console import WORDS
     from strapdown.cli.result_folder import (
         folder_to_write,
         refuse_result,
@@ -145,12 +145,7 @@ def align(
     folder = folder_to_write(
         out, source, "align", write.force, None if asked is None else source_name(asked)
     )
-    done = run_and_save(compute, folder, write, "align.json")
-    if done is not None:
-        result, seal = done
-        print_alignment(result)
-        print_findings(result.findings, MOST)
-        print_seal(seal, "align.json", write.no_report)
+    run_and_save(compute, folder, write, "align.json", print_alignment)
 
 
 def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
@@ -195,8 +190,8 @@ def _flag(place: str) -> str:
 
 
 def print_alignment(result: AlignmentRun) -> None:
-    """Print the result of an alignment, and its limits."""
-    from strapdown.cli.console import console, print_block
+    """Print the result of an alignment, its limits and its findings."""
+    from strapdown.cli.console import console, print_blocks, print_findings
     from strapdown.report import alignment_document as tables
     from strapdown.report.alignment_document import trust
     from strapdown.report.values import spaced
@@ -208,16 +203,13 @@ def print_alignment(result: AlignmentRun) -> None:
         f"{float(result.imu.index[-1] - result.imu.index[0]):.6g} s at {site.lat_deg:.5f}°, "
         f"{site.lon_deg:.5f}°"
     )
-    for block in (
-        tables.answer_table(result),
-        tables.readiness_table(result),
-        tables.bias_table(result),
-    ):
-        if block is not None:
-            print_block(block)
+    print_blocks(
+        tables.answer_table(result), tables.readiness_table(result), tables.bias_table(result)
+    )
     out.print(spaced(tables.headline(result)), style="bold")
     found = trust(result)
     style = {"trusted": "green", "reserve": "yellow", "distrusted": "bold red"}[found.verdict]
     out.print(spaced(found.sentence), style=style)
     for head, text in tables.limits(result):
         out.print(spaced(f"  - {head}: {text}"))
+    print_findings(result.findings, MOST)

@@ -72,37 +72,34 @@ def allan(
     that the record does not show has an upper bound.
     """
     from strapdown.api.allan import allan as analyse
-    from strapdown.cli.console import print_findings, print_seal
-    from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
+    from strapdown.cli.console import print_findings
+    from strapdown.cli.result_folder import (
+        file_beside,
+        folder_to_write,
+        refuse_result,
+        run_and_save,
+    )
 
     for log in logs:
         refuse_result(log, "log")
-    if sensor_file is not None:
-        _refuse_sensor_file(sensor_file, write.force)
+    beside = file_beside(
+        sensor_file, "--sensor-file", write.force, lambda run: str(run.sensor_text())
+    )
     keys = {key: value for key, value in log_keys(flags.given()).items() if value}
-    runs: list[AllanRun] = []
 
     def compute(report: Progress) -> AllanRun:
         try:
             keys.update(axes=flags.axes, at_rest=at_rest, target=program)
-            run = analyse(*map(str, logs), progress=report, **keys)
+            return analyse(*map(str, logs), progress=report, **keys)
         except ConfigError as error:
             raise as_flag(error, _flag) from None
-        runs.append(run)
-        return run
 
-    done = run_and_save(
-        compute, folder_to_write(out, logs[0], "allan", write.force), write, "allan.json"
-    )
-    if sensor_file is not None:
-        from strapdown.bundle.atomic_folder import replace_file
-
-        replace_file(sensor_file, runs[0].sensor_text().encode())
-    if done is not None:
-        result, seal = done
+    def show(result: AllanRun) -> None:
         print_noise(result, sensor_file)
         print_findings(result.findings, MOST)
-        print_seal(seal, "allan.json", write.no_report)
+
+    folder = folder_to_write(out, logs[0], "allan", write.force)
+    run_and_save(compute, folder, write, "allan.json", show, beside)
 
 
 def _flag(place: str) -> str:
@@ -113,25 +110,14 @@ def _flag(place: str) -> str:
     )
 
 
-def _refuse_sensor_file(path: Path, force: bool) -> None:
-    if path.suffix.lower() != ".toml":
-        raise ConfigError("cli.sensor-file-no-toml", quantity="--sensor-file", file=path.name)
-    if path.exists() and not force:
-        raise ConfigError("cli.file-exists", quantity="--sensor-file", file=path.name)
-
-
 def print_noise(result: AllanRun, sensor_file: Path | None) -> None:
     """Print the terms of each channel, the parameters of another program, and the next command."""
-    from strapdown.cli.console import console, print_block
+    from strapdown.cli.console import console, print_blocks
     from strapdown.report.allan import headline, parameter_table, term_tables
     from strapdown.report.values import spaced
 
     out = console()
     out.print(spaced(headline(result)), style="bold")
-    for block in (*term_tables(result), parameter_table(result)):
-        if block is not None:
-            print_block(block)
-            if block.caption:
-                out.print(spaced(block.caption), style="dim")
+    print_blocks(*term_tables(result), parameter_table(result), captions=True)
     if sensor_file is not None:
         out.print(f"Sensor {sensor_file}: strapdown navigate LOG --sensor {sensor_file}")

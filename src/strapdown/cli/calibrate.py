@@ -110,8 +110,13 @@ def calibrate(
     pose or turn that would. A magnetometer is calibrated, too.
     """
     from strapdown.api.calibrate import calibrate as find
-    from strapdown.cli.console import print_findings, print_seal
-    from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
+    from strapdown.cli.console import print_findings
+    from strapdown.cli.result_folder import (
+        file_beside,
+        folder_to_write,
+        refuse_result,
+        run_and_save,
+    )
 
     for log in logs:
         key, _, value = log.name.partition("=")
@@ -121,20 +126,14 @@ def calibrate(
         refuse_result(log, "log")
     if flags.axes is not None:
         raise ConfigError("calibrate.axes", quantity="--axes")
-    if calibration_file is not None:
-        if calibration_file.suffix.lower() != ".toml":
-            name = calibration_file.name
-            raise ConfigError("cli.sensor-file-no-toml", quantity="--calibration-file", file=name)
-        if calibration_file.exists() and not write.force:
-            raise ConfigError(
-                "cli.file-exists", quantity="--calibration-file", file=calibration_file.name
-            )
+    beside = file_beside(
+        calibration_file, "--calibration-file", write.force, lambda run: str(run.calibration_text())
+    )
     keys = {key: value for key, value in log_keys(flags.given()).items() if value}
-    runs: list[CalibrateRun] = []
 
     def compute(report: Progress) -> CalibrateRun:
         try:
-            run = find(
+            return find(
                 [str(log) for log in logs],
                 procedure=asked.procedure,
                 turns=asked.turns,
@@ -149,21 +148,13 @@ def calibrate(
             )
         except ConfigError as error:
             raise as_flag(error, _flag) from None
-        runs.append(run)
-        return run
 
-    done = run_and_save(
-        compute, folder_to_write(out, logs[0], "calibrate", write.force), write, "calibrate.json"
-    )
-    if calibration_file is not None:
-        from strapdown.bundle.atomic_folder import replace_file
-
-        replace_file(calibration_file, runs[0].calibration_text().encode())
-    if done is not None:
-        result, seal = done
+    def show(result: CalibrateRun) -> None:
         print_calibration(result)
         print_findings(result.findings, MOST)
-        print_seal(seal, "calibrate.json", write.no_report)
+
+    folder = folder_to_write(out, logs[0], "calibrate", write.force)
+    run_and_save(compute, folder, write, "calibrate.json", show, beside)
 
 
 def _flag(place: str) -> str:
@@ -173,7 +164,7 @@ def _flag(place: str) -> str:
 
 def print_calibration(result: CalibrateRun) -> None:
     """Print the errors with their bounds, and what the calibration changes."""
-    from strapdown.cli.console import console, print_block
+    from strapdown.cli.console import console, print_blocks
     from strapdown.report.calibrate import (
         effect_table,
         field_table,
@@ -183,11 +174,6 @@ def print_calibration(result: CalibrateRun) -> None:
     )
     from strapdown.report.values import spaced
 
-    out = console()
-    out.print(spaced(headline(result)), style="bold")
+    console().print(spaced(headline(result)), style="bold")
     tables = (parameter_table, effect_table, turn_table, field_table)
-    for block in (table(result) for table in tables):
-        if block is not None:
-            print_block(block)
-            if block.caption:
-                out.print(spaced(block.caption), style="dim")
+    print_blocks(*(table(result) for table in tables), captions=True)

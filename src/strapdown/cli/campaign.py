@@ -141,7 +141,7 @@ def _run(folder: Path, write: Any, compute: Any, *, complete: bool = True) -> No
     import shutil
 
     from strapdown.campaign.run import WORKING
-    from strapdown.cli.console import console, print_seal
+    from strapdown.cli.console import console
     from strapdown.cli.result_folder import run_and_save
 
     working = folder.with_name(folder.name + WORKING)
@@ -162,17 +162,16 @@ def _run(folder: Path, write: Any, compute: Any, *, complete: bool = True) -> No
             )
         return
 
-    def clean(seal: Seal) -> None:
+    def clean(_: Any, seal: Seal) -> None:
         shutil.rmtree(working, ignore_errors=True)
 
     def run_it(report: Stopwatch) -> Any:
         return compute(_counted(report), shown)
 
-    done = run_and_save(run_it, folder, write, "summary.json", clean)
-    if done is not None:
-        result, seal = done
+    def print_it(result: Any) -> None:
         print_campaign(result.design.plain(), result.summary, folder.name)
-        print_seal(seal, "summary.json", write.no_report)
+
+    run_and_save(run_it, folder, write, "summary.json", print_it, clean)
 
 
 def _counted(report: Stopwatch) -> Progress:
@@ -301,7 +300,7 @@ def case(
 def print_campaign(frozen: dict[str, Any], summary: dict[str, Any], name: str) -> None:
     """Print the answers that the first page of the report shows."""
     from strapdown.campaign.page import campaign_document
-    from strapdown.cli.console import console, print_block
+    from strapdown.cli.console import console, print_blocks
     from strapdown.report.document import Items, KeyFigures, Paragraph, TableBlock
     from strapdown.report.values import spaced
 
@@ -310,7 +309,7 @@ def print_campaign(frozen: dict[str, Any], summary: dict[str, Any], name: str) -
     out.print(spaced(document.title), style="bold", markup=False)
     for block in document.front:
         if isinstance(block, TableBlock):
-            print_block(block)
+            print_blocks(block)
         elif isinstance(block, Paragraph):
             out.print(spaced(block.text), markup=False)
         elif isinstance(block, Items):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -50,34 +51,24 @@ def compare(
     def compute(progress: Progress) -> RunComparison:
         return compare_results(runs, progress)
 
+    show = partial(_print, verbose=write.verbose)
     if out is not None:
-        kept: list[RunComparison] = []
-
-        def keep(progress: Progress) -> RunComparison:
-            kept.append(compute(progress))
-            return kept[0]
-
-        done = run_and_save(keep, out, write, "compare.json")
-        result, seal = kept[0], None if done is None else done[1]
+        result = run_and_save(compute, out, write, "compare.json", show)
     else:
         from strapdown.cli.console import progress as bar
 
-        with bar(write.quiet or write.json) as show:
-            result, seal = compute(show), None
+        with bar(write.quiet or write.json) as report:
+            result = compute(report)
         if write.json:
             typer.echo(to_json(comparison_json(result)), nl=False)
-    if not write.json and not write.quiet:
-        _print(result, verbose=write.verbose)
-        if seal is not None:
-            from strapdown.cli.console import print_seal
-
-            print_seal(seal, "compare.json", write.no_report)
+        elif not write.quiet:
+            show(result)
     if result.changed:
         raise typer.Exit(CHANGED)
 
 
 def _print(result: RunComparison, *, verbose: bool) -> None:
-    from strapdown.cli.console import console, print_block, print_findings
+    from strapdown.cli.console import console, print_blocks, print_findings
     from strapdown.report import compare_document as page
     from strapdown.report.values import spaced
 
@@ -96,9 +87,7 @@ def _print(result: RunComparison, *, verbose: bool) -> None:
         if block is None:
             continue
         out.print(f"\n{title}", style="bold")
-        print_block(block)
-        if block.caption:
-            out.print(spaced(block.caption), style="dim")
+        print_blocks(block, captions=True)
     if not verbose:
         if hidden := page.hidden_numbers(result):
             out.print(f"{hidden} further numbers differ: --verbose, or the page of --out.")

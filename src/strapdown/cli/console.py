@@ -304,13 +304,18 @@ def _print_rows(
     out.print()
 
 
-def print_block(block: TableBlock) -> None:
-    """Print a table of a report, with line breaks only where the page has them."""
+def print_blocks(*blocks: TableBlock | None, captions: bool = False) -> None:
+    """Print tables of a report, with line breaks only where the page has them; None is left out."""
     from strapdown.report.values import spaced
 
-    rows = [[spaced(cell) for cell in row] for row in block.rows]
-    columns = [spaced(name) for name in block.columns]
-    print_table(columns, rows, text=block.text, strong=block.strong)
+    for block in blocks:
+        if block is None:
+            continue
+        rows = [[spaced(cell) for cell in row] for row in block.rows]
+        columns = [spaced(name) for name in block.columns]
+        print_table(columns, rows, text=block.text, strong=block.strong)
+        if captions and block.caption:
+            console().print(spaced(block.caption), style="dim")
 
 
 def print_findings(findings: Sequence[Finding], most: int | None = None) -> None:

@@ -107,7 +107,7 @@ def crash(
         WORDS,
         Stopwatch,
         console,
-        print_block,
+        print_blocks,
         print_findings,
         print_seal,
         progress,
@@ -154,12 +154,12 @@ def crash(
             closure = closure_table(result)
         if closure is not None:
             console().print("Closure of both vehicles", style="bold")
-            print_block(closure)
+            print_blocks(closure)
 
 
 def print_crash(result: CaseResult) -> None:
     """Print the results of a case, and their limits."""
-    from strapdown.cli.console import console, print_block
+    from strapdown.cli.console import console, print_blocks
     from strapdown.report.crash_tables import (
         answers_table,
         closure_table,
@@ -190,7 +190,7 @@ def print_crash(result: CaseResult) -> None:
     for name, block in tables:
         if block is not None and block.rows:
             out.print(name, style="bold")
-            print_block(block)
+            print_blocks(block)
     out.print(spaced(headline(result)), style="bold")
     against = contradictions(result)
     if against:

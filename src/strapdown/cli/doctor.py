@@ -62,39 +62,35 @@ def doctor(
     something open is examined with the answers as inferred, and the questions are listed.
     """
     from strapdown.api.doctor import doctor as examine
-    from strapdown.cli.console import console, print_findings, print_seal
+    from strapdown.cli.console import console, print_findings
     from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
     from strapdown.systems.clean_log import axes_of_clean_log, write_clean_log
 
     for log in logs:
         refuse_result(log, "log")
     keys = {key: value for key, value in log_keys(flags.given()).items() if value}
-    found: list[Diagnosis] = []
 
     def compute(report: Progress) -> Diagnosis:
         try:
             paths = [str(log) for log in logs]
             gnss = fix_keys(fixes.given(), None)
-            found.append(examine(paths, axes=flags.axes, gnss=gnss, progress=report, **keys))
+            return examine(paths, axes=flags.axes, gnss=gnss, progress=report, **keys)
         except ConfigError as error:
             raise as_flag(error, lambda key: LOG_FLAGS.get(f"log, {key}", key)) from None
-        return found[0]
 
-    done = run_and_save(
-        compute, folder_to_write(out, logs[0], "doctor", write.force), write, "doctor.json"
-    )
-    if done is not None:
-        result, seal = done
+    def show(result: Diagnosis) -> None:
         paths = {one.name: log.path for log, one in zip(result.spec.logs, result.logs, strict=True)}
         for one in result.logs:
             print_log(one, paths, [x.log.path for x in result.logs], tables=write.verbose)
         print_findings(result.between)
-        print_seal(seal, "doctor.json", write.no_report)
+
+    folder = folder_to_write(out, logs[0], "doctor", write.force)
+    found = run_and_save(compute, folder, write, "doctor.json", show)
     if fix is not None:
-        files = write_clean_log(found[0], fix, force=write.force)
-        if done is not None:
+        files = write_clean_log(found, fix, force=write.force)
+        if not (write.json or write.quiet):
             console().print(f"Clean {', '.join(map(str, files))}")
-            said = [axes_of_clean_log(one) for one in found[0].logs]
+            said = [axes_of_clean_log(one) for one in found.logs]
             print_findings([finding for finding in said if finding is not None])
 
 
@@ -106,7 +102,7 @@ def print_log(
     `paths`: of logs by name, for commands. `logs`: paths of all that were examined.
     `tables`: also those of channels and rests.
     """
-    from strapdown.cli.console import console, print_block
+    from strapdown.cli.console import console, print_blocks
     from strapdown.report import doctor as report
     from strapdown.report.values import spaced
 
@@ -123,9 +119,7 @@ def print_log(
     blocks = [report.stream_table(one)]
     if tables:
         blocks += [report.channel_table(one), report.rest_table(one)]
-    for block in blocks:
-        if block is not None:
-            print_block(block)
+    print_blocks(*blocks)
     faults = report.wrong(one)
     for number, (head, text, fix) in enumerate(faults[:MOST], 1):
         said = _cut(" ".join(text.split()))

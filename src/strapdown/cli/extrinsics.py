@@ -85,7 +85,6 @@ def extrinsics(
     """
     from strapdown.api.extrinsics import extrinsics as find
     from strapdown.api.reading import read_gnss
-    from strapdown.cli.console import print_findings, print_seal
     from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
 
     refuse_result(log, "log")
@@ -113,12 +112,9 @@ def extrinsics(
             raise as_flag(error, _flag) from None
 
     folder = folder_to_write(out, log, "extrinsics", write.force)
-    done = run_and_save(compute, folder, write, "extrinsics.json")
-    if done is not None:
-        result, seal = done
-        print_extrinsics(result)
-        print_findings(result.findings, MOST)
-        print_seal(seal, "extrinsics.toml", write.no_report)
+    run_and_save(
+        compute, folder, write, "extrinsics.json", print_extrinsics, look_at="extrinsics.toml"
+    )
 
 
 #: Options by key path of the specification; those of reading LOG also under ``log``.
@@ -141,15 +137,14 @@ def _flag(place: str) -> str:
 
 
 def print_extrinsics(result: ExtrinsicsRun) -> None:
-    """Print the parameters, and the lines for a navigation configuration."""
-    from strapdown.cli.console import console, print_block
+    """Print the parameters, the lines for a navigation configuration, and the findings."""
+    from strapdown.cli.console import console, print_blocks, print_findings
     from strapdown.report.extrinsics import headline, navigation_lines, table
     from strapdown.report.values import spaced
 
     out = console()
     out.print(spaced(headline(result)), style="bold")
-    block = table(result)
-    print_block(block)
-    out.print(spaced(block.caption), style="dim")
+    print_blocks(table(result), captions=True)
     if result.result.kind == "gnss":
         out.print("\n" + "\n".join(navigation_lines(result)), markup=False, highlight=False)
+    print_findings(result.findings, MOST)

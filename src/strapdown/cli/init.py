@@ -212,7 +212,7 @@ def _propose(
     with progress(quiet) as report:
         report("reading", 0.1)
         made = draft(out.absolute().parent, report)
-        files = _files(out, [getattr(one, "vehicle", "") for one in made])
+        files = _files(out, [one.vehicle for one in made])
         for file in files:
             _check_free(file, usual, force=force)
         for file, one in zip(files, made, strict=True):
@@ -248,7 +248,7 @@ def _print_draft(
     page.print("Found", style="bold")
     for line in made.found:
         page.print(f"  {line}")
-    left_out = [s for s in made.left_out if s not in told] if command == "crash" else []
+    left_out = [s for s in made.left_out if s not in told]
     told += left_out
     if left_out:
         page.print("Left out", style="bold")

@@ -154,7 +154,7 @@ def navigate(
 ) -> None:
     """Find position, velocity and attitude over a record, by inertial sensors and measurements."""
     from strapdown.bundle import write_latency
-    from strapdown.cli.console import WORDS, print_seal
+    from strapdown.cli.console import WORDS
     from strapdown.cli.result_folder import (
         claim,
         folder_to_write,
@@ -223,25 +223,24 @@ def navigate(
         drive: dict[str, Any] = {} if played is None else {"drive": played}
         return run_navigation(spec, source if own else None, report, **drive)
 
-    def latency(seal: Seal) -> None:
+    def further(_: NavigationRun, seal: Seal) -> None:
         found = None if played is None else played.tape.latency()
         if found is not None:
             write_latency(seal, {"pace": pace, **found.told()})
+        if received is not None:
+            from strapdown.cli.live_folder import let_go_of_received
 
-    done = run_and_save(compute, folder, write, "navigation.json", latency)
-    if received is not None:
-        from strapdown.cli.live_folder import let_go_of_received
+            let_go_of_received(folder)
 
-        let_go_of_received(folder)
-    if done is not None:
+    def show(result: NavigationRun) -> None:
         from strapdown.cli.navigate_tables import print_latency, print_navigation
 
-        result, seal = done
         print_navigation(result, result.findings, verbose=write.verbose)
         found = None if played is None else played.tape.latency()
         if found is not None:
             print_latency(found, f"played, pace {pace}")
-        print_seal(seal, "navigation.json", write.no_report)
+
+    run_and_save(compute, folder, write, "navigation.json", show, further)
 
 
 def _session_that_navigated(path: Path, *, pace: bool = False) -> Path | None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from strapdown.cli.console import WORDS, console, print_block, print_findings, print_table
+from strapdown.cli.console import WORDS, console, print_blocks, print_findings, print_table
 from strapdown.errors import Finding
 from strapdown.report.document import MOST_SAID, TableBlock
 from strapdown.report.navigation_document import (
@@ -90,7 +90,7 @@ def print_navigation(
     for k, block in enumerate(tables):
         if block is not None:
             most = MOST_VERBOSE if verbose or not k else MOST
-            print_block(replace(block, rows=block.rows[:most]))
+            print_blocks(replace(block, rows=block.rows[:most]))
             room -= 4 + min(len(block.rows), most)
             if len(block.rows) > most:
                 out.print(f"  {len(block.rows) - most} more rows; see the report")

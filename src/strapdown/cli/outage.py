@@ -16,6 +16,7 @@ from strapdown.cli.shared_options import (
     LENGTH,
     ReportFlags,
     as_flag,
+    flags_by_key,
     folder_to_make,
     module_of_flag,
     option,
@@ -36,30 +37,6 @@ EPILOG = (
 moving = partial(option, "Motion, for a sensor")
 starting = partial(option, "Initial standard deviations, for a sensor")
 during = partial(option, "Instants, for a navigation run")
-
-#: Flags by key path of the specification.
-FLAGS = {
-    "outage_s": "--outage",
-    "places": "--places",
-    "at_s": "--at",
-    "from_s": "--from",
-    "to_s": "--to",
-    "duration_s": "--duration",
-    "sensor": "SENSOR|BUNDLE",
-    "motion, speed_m_per_s": "--speed",
-    "motion, to_speed_m_per_s": "--to-speed",
-    "motion, turn_rate_deg_per_s": "--turn-rate",
-    "motion, heading_deg": "--heading",
-    "motion, lat_deg": "--lat",
-    "start, aided_s": "--aided",
-    "start, fix_position_sd_m": "--fix-sd",
-    "start, position_sd_m": "--position-sd",
-    "start, velocity_sd_m_per_s": "--velocity-sd",
-    "start, tilt_sd_deg": "--tilt-sd",
-    "start, heading_sd_deg": "--heading-sd",
-    "start, gyro_bias_sd_deg_per_h": "--gyro-bias-sd",
-    "start, accel_bias_sd_ug": "--accel-bias-sd",
-}
 
 
 @dataclass(frozen=True)
@@ -130,6 +107,16 @@ class OutageFlags:
     duration_s: Annotated[float | None, during("S", LENGTH, "--duration")] = None
 
 
+#: Flags by key path of the specification.
+FLAGS = {
+    "outage_s": "--outage",
+    "sensor": "SENSOR|BUNDLE",
+    **flags_by_key(OutageFlags),
+    **flags_by_key(MotionFlags, "motion, "),
+    **flags_by_key(StartFlags, "start, "),
+}
+
+
 @spread
 def outage(
     source: Annotated[
@@ -165,7 +152,7 @@ def outage(
     For a sensor the prediction uses its data sheet and a stated motion. For a navigation run it
     uses the filter's own state, and compares the prediction with the measured drifts.
     """
-    from strapdown.cli.console import WORDS, print_findings, print_seal
+    from strapdown.cli.console import WORDS
     from strapdown.cli.result_folder import folder_to_write, run_and_save, source_name
     from strapdown.report.outage import read_run_of_outage
     from strapdown.systems.inputs import check_part
@@ -185,12 +172,7 @@ def outage(
         return run_outage(spec, navigation, file, report)
 
     folder = folder_to_write(out, source, "outage", write.force, named)
-    done = run_and_save(compute, folder, write, "outage.json")
-    if done is not None:
-        result, seal = done
-        print_outage(result)
-        print_findings(result.findings)
-        print_seal(seal, "outage.json", write.no_report)
+    run_and_save(compute, folder, write, "outage.json", print_outage)
 
 
 def outage_of_flags(
@@ -254,8 +236,8 @@ def _flag(place: str) -> str:
 
 
 def print_outage(result: OutageRun) -> None:
-    """Print the predicted drift, its sources, and the measured drifts."""
-    from strapdown.cli.console import console, print_block
+    """Print the predicted drift, its sources, the measured drifts, and the findings."""
+    from strapdown.cli.console import console, print_blocks, print_findings
     from strapdown.report import outage_document as words
     from strapdown.report.outage_document import budget_table, drift_table, time_table
     from strapdown.report.values import spaced
@@ -265,10 +247,9 @@ def print_outage(result: OutageRun) -> None:
     out.print(spaced(f"At the start: {words.start_words(result)}"))
     if result.stays:
         out.print(f"Remaining measurements: {', '.join(result.stays)}")
-    for block in (time_table(result), budget_table(result), drift_table(result)):
-        if block is not None:
-            print_block(block)
+    print_blocks(time_table(result), budget_table(result), drift_table(result))
     out.print(spaced(words.headline(result)), style="bold")
     out.print(spaced(words.remedy(result)), style="yellow")
     if words.inside_words(result):
         out.print(spaced(words.inside_words(result)))
+    print_findings(result.findings)

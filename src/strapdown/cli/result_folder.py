@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from strapdown.cli.console import RESOURCES, Stopwatch, progress
+from strapdown.cli.console import RESOURCES, Stopwatch, print_seal, progress
 from strapdown.errors import ConfigError, DataError, Finding
 
 if TYPE_CHECKING:
@@ -130,20 +130,22 @@ def run_and_save(
     folder: Path,
     write: ReportFlags,
     answer: str,
-    *more: Callable[[Seal], None],
-) -> tuple[Any, Seal] | None:
-    """Run with progress, and save the result with the times of its stages.
+    show: Callable[[Any], None],
+    *more: Callable[[Any, Seal], None],
+    look_at: str | None = None,
+) -> Any:
+    """Run with progress, save the result with the times of its stages, print and return it.
 
     `compute`: returns a result with `save`; it reports its stages. `answer`: file of the result
-    that ``--json`` prints. `*more`: write further files outside the seal. Returns result and
-    seal, or None if the rest is not to be printed. ConfigError: the folder exists and must not be
-    replaced; or as `compute`.
+    that ``--json`` prints. `show`: prints the result. `*more`: write further files outside the
+    seal. `look_at`: file to open where there is no page, if not `answer`. ConfigError: the folder
+    exists and must not be replaced; or as `compute`.
     """
     from strapdown.bundle import write_timing
 
     claim(folder, write.force)
-    with progress(write.quiet or write.json) as show:
-        report = Stopwatch(show)
+    with progress(write.quiet or write.json) as bar:
+        report = Stopwatch(bar)
         result = compute(report)
         seal: Seal = result.save(
             folder, report=not write.no_report, force=write.force, progress=report
@@ -151,7 +153,31 @@ def run_and_save(
         report.stop()
         write_timing(seal, report.seconds)
         for one in more:
-            one(seal)
+            one(result, seal)
     if write.json:
         typer.echo((seal.path / answer).read_text(encoding="utf-8"), nl=False)
-    return None if write.json or write.quiet else (result, seal)
+    elif not write.quiet:
+        show(result)
+        print_seal(seal, look_at or answer, write.no_report)
+    return result
+
+
+def file_beside(
+    path: Path | None, flag: str, force: bool, text: Callable[[Any], str]
+) -> Callable[[Any, Seal], None]:
+    """Return what writes a TOML file of a result beside its folder, if there is a path.
+
+    ConfigError: it is none, or is there and must not be replaced.
+    """
+    if path is not None and path.suffix.lower() != ".toml":
+        raise ConfigError("cli.sensor-file-no-toml", quantity=flag, file=path.name)
+    if path is not None and path.exists() and not force:
+        raise ConfigError("cli.file-exists", quantity=flag, file=path.name)
+
+    def write(result: Any, _: Seal) -> None:
+        if path is not None:
+            from strapdown.bundle.atomic_folder import replace_file
+
+            replace_file(path, text(result).encode())
+
+    return write

@@ -46,7 +46,7 @@ def sensors(
     in an outage (standard deviations against time).
     """
     from strapdown.bundle import to_json
-    from strapdown.cli.console import print_findings, print_seal
+    from strapdown.cli.console import print_findings
     from strapdown.cli.result_folder import run_and_save
     from strapdown.config.outage import SensorsSpec
     from strapdown.config.spec import specify
@@ -80,33 +80,29 @@ def sensors(
         except ConfigError as error:
             raise as_flag(error, lambda place: FLAGS.get(place, place)) from None
 
-    if out is not None:
-        done = run_and_save(compute, out, write, "sensors.json")
-        if done is None:
-            return
-        run, seal = done
-    else:
-        from strapdown.cli.console import progress as bar
+    def show(run: SensorsRun) -> None:
+        _print(report.list_block(report.catalogue_table(run.sensors)))
+        if (drift := report.drift_block(run)) is not None:
+            _print(drift)
+        print_findings(run.findings)
 
-        with bar(write.quiet or write.json) as show:
-            run, seal = compute(show), None
-        if write.json:
-            typer.echo(to_json(report.sensors_json(run)), nl=False)
-            return
-    for block in (report.list_block(report.catalogue_table(run.sensors)), report.drift_block(run)):
-        if block is not None:
-            _print(block)
-    print_findings(run.findings)
-    if seal is not None:
-        print_seal(seal, "sensors.json", write.no_report)
+    if out is not None:
+        run_and_save(compute, out, write, "sensors.json", show)
+        return
+    from strapdown.cli.console import progress as bar
+
+    with bar(write.quiet or write.json) as reported:
+        run = compute(reported)
+    if write.json:
+        typer.echo(to_json(report.sensors_json(run)), nl=False)
+    else:
+        show(run)
 
 
 def _print(block: Any) -> None:
-    from strapdown.cli.console import console, print_block
+    from strapdown.cli.console import console, print_blocks
     from strapdown.report.values import spaced
 
     if block.title:
         console().print(spaced(block.title), style="bold")
-    print_block(block)
-    if block.caption:
-        console().print(spaced(block.caption), style="dim")
+    print_blocks(block, captions=True)

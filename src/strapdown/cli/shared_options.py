@@ -175,23 +175,29 @@ class FixFlags:
         return asdict(self)
 
 
+def flag_of(name: str) -> str:
+    """The flag of a parameter of a command."""
+    return "--" + name.removesuffix("_s").replace("_", "-")
+
+
+#: Keys of ``[log]``, and of a table of fixes, by the names of their flags.
+LOG_KEYS = {f.name: f.name for f in fields(LogFlags) if f.name != "axes"}
+LOG_KEYS |= {"rate": "rate_hz", "duration": "duration_s"}
+FIX_KEYS = {name: name for name in (f.name.removeprefix("gnss_") for f in fields(FixFlags))}
+FIX_KEYS |= {"datum_height": "datum_height_m", "position_sd": "position_sd_m"}
+FIX_KEYS |= {"velocity_sd": "velocity_sd_m_per_s"}
+
+
 def fix_keys(given: Mapping[str, Any], path: Path | None) -> dict[str, Any]:
     """Keys of a table of fixes by the flags, without those not given; empty without any.
 
     `given`: as `FixFlags.given`; other entries are ignored. `path`: of the fixes. ConfigError: an
     option has another form.
     """
-    columns, units = (_pairs(given[name], flag_of(name)) for name in ("gnss_columns", "gnss_units"))
-    keys = {
-        "path": None if path is None else str(path),
-        "format": given["gnss_format"],
-        "columns": columns or None,
-        "units": units or None,
-        "datum_height_m": given["gnss_datum_height"],
-        "origin": _origin_or_zone(given["gnss_origin"]),
-        "position_sd_m": given["gnss_position_sd"],
-        "velocity_sd_m_per_s": given["gnss_velocity_sd"],
-    }
+    keys = {key: given[f"gnss_{name}"] for name, key in FIX_KEYS.items()}
+    for key in ("columns", "units"):
+        keys[key] = _pairs(keys[key], f"--gnss-{key}") or None
+    keys |= {"path": None if path is None else str(path), "origin": _origin_or_zone(keys["origin"])}
     return {key: value for key, value in keys.items() if value is not None}
 
 
@@ -232,20 +238,11 @@ def log_keys(given: Mapping[str, Any]) -> dict[str, Any]:
     from strapdown.systems.inputs import check_part
 
     check_part(given["from_s"], given["to_s"], given["duration"])
-    return {
-        "format": given["format"],
-        "columns": parse_column_option(given["columns"] or []),
-        "gyro_unit": given["gyro_unit"],
-        "accel_unit": given["accel_unit"],
-        "time_unit": given["time_unit"],
-        "sampling": given["sampling"],
-        "rate_hz": given["rate"],
-        "repair": bool(given["repair"]),
-        "calibration": None if given["calibration"] is None else str(given["calibration"]),
-        "from_s": given["from_s"],
-        "to_s": given["to_s"],
-        "duration_s": given["duration"],
-    }
+    keys = {key: given[name] for name, key in LOG_KEYS.items()}
+    keys["columns"] = parse_column_option(given["columns"] or [])
+    keys["repair"] = bool(given["repair"])
+    keys["calibration"] = None if given["calibration"] is None else str(given["calibration"])
+    return keys
 
 
 def folder_to_make(name: str) -> Any:
@@ -363,34 +360,21 @@ def spread(command: Callable[..., None]) -> Callable[..., None]:
 # --- flags as keys of a specification --------------------------------------------------
 
 #: How a log is read; common to all commands.
-LOG_FLAGS = {
-    "axes, axes": "--axes",
-    "log, from_s": "--from",
-    "log, to_s": "--to",
-    "log, duration_s": "--duration",
-    "log, sampling": "--sampling",
-    "log, rate_hz": "--rate",
-    "log, format": "--format",
-    "log, columns": "--columns",
-    "log, repair": "--repair",
-    "log, calibration": "--calibration",
-    "log, gyro_unit": "--gyro-unit",
-    "log, accel_unit": "--accel-unit",
-    "log, time_unit": "--time-unit",
-}
+LOG_FLAGS = {"axes, axes": "--axes", **{f"log, {k}": flag_of(n) for n, k in LOG_KEYS.items()}}
 
 
 def fix_flags(table: str) -> dict[str, str]:
     """Flags of the fixes by key path, under the table that has them."""
-    return {
-        f"{table}, format": "--gnss-format",
-        f"{table}, columns": "--gnss-columns",
-        f"{table}, units": "--gnss-units",
-        f"{table}, datum_height_m": "--gnss-datum-height",
-        f"{table}, origin": "--gnss-origin",
-        f"{table}, position_sd_m": "--gnss-position-sd",
-        f"{table}, velocity_sd_m_per_s": "--gnss-velocity-sd",
+    return {f"{table}, {key}": flag_of(f"gnss_{name}") for name, key in FIX_KEYS.items()}
+
+
+def flags_by_key(options: type, table: str = "") -> dict[str, str]:
+    """Flags of a set of options that are named by the keys of a table, by key path."""
+    # The first word of an annotated option is its flag.
+    own = {
+        n: h.__metadata__[0].default for n, h in get_type_hints(options, None, None, True).items()
     }
+    return {f"{table}{n}": f if isinstance(f, str) else flag_of(n) for n, f in own.items()}
 
 
 def refuse_beside_file(
@@ -427,11 +411,6 @@ def refuse_without_live(given: Mapping[str, Any]) -> None:
     for flag, value in given.items():
         if value is not None:
             raise ConfigError("live.only-with", option=flag, beside="--live")
-
-
-def flag_of(name: str) -> str:
-    """The flag of a parameter of a command."""
-    return "--" + name.removesuffix("_s").replace("_", "-")
 
 
 def as_flag(error: ConfigError, flag: Callable[[str], str]) -> ConfigError:

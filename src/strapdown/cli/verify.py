@@ -44,7 +44,7 @@ def verify(
     from strapdown.bundle.atomic_folder import replace_file
     from strapdown.cli.console import WORDS, console, progress
     from strapdown.errors import ConfigError
-    from strapdown.report.verification_page import verification_page
+    from strapdown.report.verify import verification_page
     from strapdown.report.verify import verify as check
 
     if page is not None and page.exists():

@@ -187,9 +187,6 @@ class AllanSpec(FileSpec):
     target: Annotated[Word, accepted_by(_target)] | None = None
 
 
-PROCEDURES = ("positions", "six-position", "turns", "rate-table", "magnetometer")
-
-
 class KnownTurn(Spec):
     """A rotation of a calibration that is known: its angle, or its rate over a stretch."""
 

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from strapdown.errors import Finding
+
 #: Placeholder for a value that only the user knows.
 ASK = '"?"'
 WIDTH = 100
@@ -119,6 +121,26 @@ class Offered:
     values: Mapping[str, Any]
     what: str
     label: str
+
+
+@dataclass(frozen=True)
+class Draft:
+    """Proposed configuration: its text, what it rests on, and what is open.
+
+    `asked`: values to state, `to_check`: to confirm; `offers`: tables that are comments. Of a crash
+    `vehicle`: its number, empty where the records do not number vehicles; `name` as they state it;
+    `left_out`: what of the records is not in it.
+    """
+
+    text: str
+    found: tuple[str, ...] = ()
+    asked: tuple[Asked, ...] = ()
+    to_check: tuple[Asked, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    offers: tuple[Offered, ...] = ()
+    vehicle: str = ""
+    name: str = ""
+    left_out: tuple[Any, ...] = ()
 
 
 @dataclass

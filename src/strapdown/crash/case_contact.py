@@ -14,7 +14,7 @@ from strapdown.config.crash_case import CaseSpec, EntrySpec, PointSpec, Referenc
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.path import at_instant
 from strapdown.crash.reconstruction import CrashReconstruction, UnitReconstruction
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 
 if TYPE_CHECKING:
     from strapdown.crash.case import CaseResult
@@ -185,9 +185,7 @@ def closed_together(first: CaseResult, second: CaseResult) -> tuple[CaseResult, 
         elif len(depths) == 2:
             share = equal_force_share(*((v.crush_m or 0.0, v.crush_sd_m) for v in depths))
         elif energies or depths:
-            findings.append(
-                Finding("crash.crush-of-one", severity="note", quantity="vehicle, crush_m")
-            )
+            add_note(findings, "crash.crush-of-one", quantity="vehicle, crush_m")
         closure = close_vehicles(*pair, friction=friction, energy_share=share)
         findings += closure.findings
         findings += _deformation_apart((first, second), closure)
@@ -222,14 +220,13 @@ def closed_against_barrier(result: CaseResult) -> CaseResult:
     if closure.contradicted:
         findings.append(Finding("crash.no-rigid-barrier", quantity="vehicle, against", name=name))
     elif apart is not None and apart.high < 0.0:
-        findings.append(
-            Finding(
-                "crash.moves-on-at-barrier",
-                quantity="vehicle, against",
-                name=name,
-                value=-apart.value,
-                low=-apart.high,
-            )
+        add_warning(
+            findings,
+            "crash.moves-on-at-barrier",
+            quantity="vehicle, against",
+            name=name,
+            value=-apart.value,
+            low=-apart.high,
         )
     findings += _deformation_apart((result,), closure)
     return replace(result, closure=closure, findings=_once(findings))

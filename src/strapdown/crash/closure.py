@@ -37,7 +37,7 @@ from numpy.typing import ArrayLike
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.pdof import covariance_of
 from strapdown.dsp.chi_square import chi_square_above, normal_above, normal_quantile
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note
 from strapdown.rotation import within_half_turn
 from strapdown.tables.checks import Array
 from strapdown.units import ACCEL_UNITS, SPEEDS
@@ -613,9 +613,7 @@ def _closed(
     else:
         findings += _limits(vehicles, impact, values, spread, level)
         if not impact.at_contact:
-            findings.append(
-                Finding("crash.closure-of-centers", severity="note", quantity="contact")
-            )
+            add_note(findings, "crash.closure-of-centers", quantity="contact")
 
     def figure(index: int) -> Figure | None:
         return Figure.from_sd(values[index], sds[index]) if known else None

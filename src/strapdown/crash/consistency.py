@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown.constants import STANDARD_GRAVITY, Flags
 from strapdown.crash.acceleration import window_weights
 from strapdown.crash.measuring_point import LEVER_ARM, MOUNTING, NO_TURNING, PointKinematics
 from strapdown.crash.structure import (
@@ -30,7 +30,7 @@ from strapdown.crash.structure import (
     unlearnt,
 )
 from strapdown.dsp.chi_square import chi_square_above
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.sensors.unmeasured import NO_GYRO
 from strapdown.tables.checks import Array
 
@@ -544,27 +544,26 @@ def lever_arm_findings(
     `stated`, (3,), m: position of the first minus that of the second; `stated_sd`, m, of each
     coordinate.
     """
-    found = []
+    found: list[Finding] = []
     along = check.directions.T @ check.correction
     for k in np.flatnonzero(check.told):
         ratio = abs(float(along[k])) / float(np.hypot(check.sd[k], stated_sd))
         if ratio <= SIGMAS:
             continue
         d = check.directions[:, k] * np.sign(along[k])
-        found.append(
-            Finding(
-                "crash.direction-their-forces-stated",
-                file=first,
-                quantity="position",
-                d=d[0],
-                d_2=d[1],
-                d_3=d[2],
-                d_4=float(d @ stated) + abs(float(along[k])),
-                sd=check.sd[k],
-                second=second,
-                d_5=float(d @ stated),
-                stated_sd=stated_sd,
-            )
+        add_warning(
+            found,
+            "crash.direction-their-forces-stated",
+            file=first,
+            quantity="position",
+            d=d[0],
+            d_2=d[1],
+            d_3=d[2],
+            d_4=float(d @ stated) + abs(float(along[k])),
+            sd=check.sd[k],
+            second=second,
+            d_5=float(d @ stated),
+            stated_sd=stated_sd,
         )
     return found
 
@@ -697,7 +696,7 @@ def axis_findings(match: AxisMatch, first: str, second: str) -> list[Finding]:
             ("gyro", match.gyro, match.gyro_lead),
         ],
     }[kind]
-    found = []
+    found: list[Finding] = []
     for part, matrix, lead in parts:
         moved = [
             Finding(
@@ -714,22 +713,20 @@ def axis_findings(match: AxisMatch, first: str, second: str) -> list[Finding]:
         doubt = []
         if match.ambiguous and part != "gyro":
             doubt = [Finding("crash.axes-ambiguous", severity="note", axes=match.ambiguous)]
-        found.append(
-            Finding(
-                f"crash.{part}-axes-differ",
-                file=second,
-                quantity="axes",
-                moved=moved,
-                lead=math.sqrt(lead),
-                doubt=doubt,
-            )
+        add_warning(
+            found,
+            f"crash.{part}-axes-differ",
+            file=second,
+            quantity="axes",
+            moved=moved,
+            lead=math.sqrt(lead),
+            doubt=doubt,
         )
     return found
 
 
 # Comparison of several units on one vehicle: whether they agree within stated uncertainty.
 
-Flags = NDArray[np.bool_]
 # Variance of assumed axes, relative to the largest: no weight beside measured ones.
 NO_WEIGHT = 1e8
 
@@ -962,20 +959,19 @@ def compare_pair(
         ratio = np.abs(curve[1:]) / np.where(sd[1:] > 0.0, sd[1:], np.inf) + 0.0 * sd[1:]
         row, axis = np.unravel_index(int(np.nanargmax(ratio)), ratio.shape)
         share = f"{probability:.1g}" if probability > 1e-12 else "less than 1e-12"
-        findings.append(
-            Finding(
-                "crash.disagree-their-common-point-chi",
-                file=first.name,
-                quantity="delta-V",
-                name=second.name,
-                chi=chi,
-                freedom=freedom,
-                share=share,
-                axes=AXES[axis],
-                edges=edges[row + 1],
-                curve=curve[row + 1, axis],
-                sd=sd[row + 1, axis],
-            )
+        add_warning(
+            findings,
+            "crash.disagree-their-common-point-chi",
+            file=first.name,
+            quantity="delta-V",
+            name=second.name,
+            chi=chi,
+            freedom=freedom,
+            share=share,
+            axes=AXES[axis],
+            edges=edges[row + 1],
+            curve=curve[row + 1, axis],
+            sd=sd[row + 1, axis],
         )
     found = axis_findings(axes, first.name, second.name)
     if whole and not found and first.prepared is not None and second.prepared is not None:
@@ -1251,30 +1247,27 @@ def _odd_one(units: Sequence[PointKinematics], pairs: Sequence[UnitPair]) -> lis
 
 def _of_structure(units: Sequence[PointKinematics], structure: Structure) -> list[Finding]:
     """Report what the differences show beyond the sensors: structure, and turning."""
-    found = []
+    found: list[Finding] = []
     names = ", ".join(u.name for u in units)
     if structure.reported:
-        found.append(
-            Finding(
-                "crash.points-move-with-structure",
-                severity="note",
-                file=names,
-                quantity="delta-V",
-                forward=structure.sd[0],
-                right=structure.sd[1],
-                down=structure.sd[2],
-                share=100.0 * float(structure.expected.max()),
-                correlation_ms=1e3 * structure.expected_time,
-            )
+        add_note(
+            found,
+            "crash.points-move-with-structure",
+            file=names,
+            quantity="delta-V",
+            forward=structure.sd[0],
+            right=structure.sd[1],
+            down=structure.sd[2],
+            share=100.0 * float(structure.expected.max()),
+            correlation_ms=1e3 * structure.expected_time,
         )
     if structure.turning > 1.0:
-        found.append(
-            Finding(
-                "crash.turned-more-than-assumed",
-                file=names,
-                quantity="turn_sd_deg",
-                factor=structure.turning,
-            )
+        add_warning(
+            found,
+            "crash.turned-more-than-assumed",
+            file=names,
+            quantity="turn_sd_deg",
+            factor=structure.turning,
         )
     return found
 

@@ -232,38 +232,6 @@ def crush_energy(
     return Figure.from_sd(value * factor, math.hypot(factor * math.sqrt(variance), value * spread))
 
 
-def measured_crush_energy(
-    force: ArrayLike,
-    crush: ArrayLike,
-    *,
-    force_scale_sd: float = 0.0,
-    force_offset_sd: float = 0.0,
-    crush_scale_sd: float = 0.0,
-) -> Figure:
-    """Energy from measured force, N, over measured dynamic crush, m: its integral, J.
-
-    `force`, `crush`, (n,): samples in the order of time (barrier load cells, and displacement of
-    the center of mass). To the largest crush the integral is what the structure took, over the
-    rebound too what it kept. sd: relative of the scales, and of the offset of the force, N.
-
-    Raises
-    ------
-    DataError
-        Fewer than two samples, different lengths, a number that is not finite, a negative sd.
-    """
-    f, s = np.asarray(force, dtype=np.float64), np.asarray(crush, dtype=np.float64)
-    good = f.ndim == 1 and f.shape == s.shape and f.size >= 2
-    good = good and bool(np.isfinite(f).all() and np.isfinite(s).all())
-    sds = (force_scale_sd, force_offset_sd, crush_scale_sd)
-    if not (good and all(math.isfinite(v) and v >= 0.0 for v in sds)):
-        raise DataError("crash.crush-profile", quantity="force", value=[f.size, s.size])
-    energy = float(np.sum(0.5 * (f[1:] + f[:-1]) * np.diff(s)))
-    sd = math.hypot(
-        energy * force_scale_sd, energy * crush_scale_sd, force_offset_sd * float(s[-1] - s[0])
-    )
-    return Figure.from_sd(energy, sd)
-
-
 def energy_equivalent_speed(energy: Figure, mass: Pair) -> Figure:
     """Speed at which the vehicle's kinetic energy is its energy of deformation, m/s.
 

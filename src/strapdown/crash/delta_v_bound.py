@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
-from strapdown.constants import TWO_SIDED_95
+from strapdown.constants import TWO_SIDED_95, Triple
 from strapdown.crash.acceleration import NOISE, by_contributor
 from strapdown.crash.contact import Contact
 from strapdown.crash.delta_v import DeltaV
@@ -20,8 +20,6 @@ from strapdown.crash.pdof import NedPdof, Pdof, PdofInterval, ned_pdof, pdof, pd
 from strapdown.errors import DataError
 from strapdown.rotation import cross_matrix
 from strapdown.tables.checks import Array
-
-Triple = tuple[float, float, float]
 
 #: Names of the windows in words.
 WINDOWS = {"peak": "peak", "event": "contact"}

@@ -47,7 +47,7 @@ from strapdown.crash.structure import STRUCTURE
 from strapdown.dsp.chi_square import chi_square_above
 from strapdown.dsp.samples import true_runs
 from strapdown.ellipsoids import WGS84
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.evaluation.control_points import rigid_fit
 from strapdown.frames import geodetic_from_ned, place_difference
 from strapdown.increments import motion_increments
@@ -760,15 +760,7 @@ def _calibration(
         if contradicts(size, own):
             said.append(_contradiction(what.of, what.quantity, axis, size))
     if held:
-        said.append(
-            Finding(
-                "crash.drive-below-crash",
-                severity="note",
-                file=at.name,
-                quantity="scale",
-                held=held,
-            )
-        )
+        add_note(said, "crash.drive-below-crash", file=at.name, quantity="scale", held=held)
     constants = best.constants[-3:], best.constants_sd[-3:]
     for name, size, own, stated in zip(
         ("speed scale", "speed delay"),
@@ -834,7 +826,7 @@ def first_guesses(
     ahead = late * (end - fixes.instants[-1])
     place = geodetic_from_ned(ahead, fixes.place[-1])
     speed = math.hypot(late[0], late[1])
-    findings = []
+    findings: list[Finding] = []
     headings: list[float] = []
     if priors.heading_deg is not None:
         headings = [priors.heading_deg]
@@ -845,8 +837,8 @@ def first_guesses(
         if by_change is not None and not any(_near(by_change, h) for h in headings):
             headings.append(by_change)
         if speed < LEAST_SPEED:
-            findings.append(
-                Finding("crash.fixes-before-anchor-say-too", quantity="heading", speed=speed)
+            add_warning(
+                findings, "crash.fixes-before-anchor-say-too", quantity="heading", speed=speed
             )
     guesses = [
         NavState.from_degrees(
@@ -1017,42 +1009,38 @@ def say_outliers(record: pd.DataFrame, names: Sequence[str] = ("position", "velo
 
 def findings_on_fixes(record: pd.DataFrame, source: str | None, impact: float) -> list[Finding]:
     """Return the findings on the fixes, or speeds, that were rejected or down-weighted."""
-    found = []
+    found: list[Finding] = []
     late = record["why"].map(lambda why: any(f.code in LATE for f in why))
     refused = record[~record["used"] & ~late]
     if len(refused):
-        found.append(
-            Finding(
-                "crash.fixes-before-impact-not-believed",
-                file=source,
-                quantity="fixes",
-                count=len(refused),
-                time=refused.index[0],
-                reasons=refused["why"].iloc[0],
-            )
+        add_warning(
+            found,
+            "crash.fixes-before-impact-not-believed",
+            file=source,
+            quantity="fixes",
+            count=len(refused),
+            time=refused.index[0],
+            reasons=refused["why"].iloc[0],
         )
     lower = record[record["used"] & (record["why"].map(len) > 0)]
     if len(lower):
-        found.append(
-            Finding(
-                "crash.fixes-less-weight-or-none",
-                file=source,
-                quantity="fixes",
-                count=len(lower),
-                time=lower.index[0],
-                reasons=lower["why"].iloc[0],
-            )
+        add_warning(
+            found,
+            "crash.fixes-less-weight-or-none",
+            file=source,
+            quantity="fixes",
+            count=len(lower),
+            time=lower.index[0],
+            reasons=lower["why"].iloc[0],
         )
     used = record.index[record["used"]]
     if len(used) and impact - used[-1] > 2.0:
-        found.append(
-            Finding(
-                "crash.last-fix-used-before-anchor",
-                severity="note",
-                file=source,
-                quantity="fixes",
-                impact=impact - used[-1],
-            )
+        add_note(
+            found,
+            "crash.last-fix-used-before-anchor",
+            file=source,
+            quantity="fixes",
+            impact=impact - used[-1],
         )
     return found
 
@@ -1064,25 +1052,23 @@ def findings(best: Estimate, source: str | None, priors: EntryPriors) -> list[Fi
         found.append(Finding("crash.side-slip-not-used-no", file=source, quantity="heading"))
     heading_sd = math.degrees(math.sqrt(best.covariance[8, 8]))
     if heading_sd > WIDE_HEADING:
-        found.append(
-            Finding(
-                "crash.heading-known-only-drive-vehicle",
-                file=source,
-                quantity="heading",
-                heading_sd=min(heading_sd, 180.0),
-            )
+        add_warning(
+            found,
+            "crash.heading-known-only-drive-vehicle",
+            file=source,
+            quantity="heading",
+            heading_sd=min(heading_sd, 180.0),
         )
     if unlikely(best.chi_square, best.degrees_of_freedom):
-        found.append(
-            Finding(
-                "crash.fixes-fit-worse-than-their",
-                file=source,
-                quantity="fixes",
-                chi_square=best.chi_square,
-                degrees_of_freedom=best.degrees_of_freedom,
-                variance_factor=best.chi_square / best.degrees_of_freedom,
-                sd_factor=math.sqrt(best.chi_square / best.degrees_of_freedom),
-            )
+        add_warning(
+            found,
+            "crash.fixes-fit-worse-than-their",
+            file=source,
+            quantity="fixes",
+            chi_square=best.chi_square,
+            degrees_of_freedom=best.degrees_of_freedom,
+            variance_factor=best.chi_square / best.degrees_of_freedom,
+            sd_factor=math.sqrt(best.chi_square / best.degrees_of_freedom),
         )
     return found
 

@@ -12,12 +12,12 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown import rotation
+from strapdown.constants import Triple
 from strapdown.errors import ConfigError, Finding, check_choice
 from strapdown.nav_state import NavState
 from strapdown.sensors.triad_errors import finite, triple
 from strapdown.tables.checks import Array
 
-Triple = tuple[float, float, float]
 NUMBERS = (
     ("time", "s"),
     ("heading_deg", "deg"),

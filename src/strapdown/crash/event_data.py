@@ -16,7 +16,7 @@ from strapdown.crash.record_parts import (
     Skipped,
     find_clock,
 )
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_note, add_warning
 from strapdown.formats.crash_edr import KMH, element_of, rounding
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.tables.checks import Array
@@ -81,13 +81,12 @@ def recorder_parts(path: str, record: CrashRecord) -> Recorder:
         )
         skipped.append(Skipped(path, what, why, names))
     if others:
-        findings.append(
-            Finding(
-                "crash.several-events-of-recorder",
-                file=record.path.name,
-                event=chosen,
-                others=[str(n) for n in others],
-            )
+        add_warning(
+            findings,
+            "crash.several-events-of-recorder",
+            file=record.path.name,
+            event=chosen,
+            others=[str(n) for n in others],
         )
     for channel in record.channels:
         if channel.quantity in ("velocity", "acceleration", "rate") and not channel.axis:
@@ -244,11 +243,7 @@ def drop_copies(parts: Sequence[Part]) -> tuple[list[Part], list[Skipped], list[
         names = tuple(part.channels.values())
         why = f"the same recorder as {twin.path}: the numbers are the same, to their rounding"
         skipped.append(Skipped(part.path, ", ".join(names), why, names))
-        findings.append(
-            Finding(
-                "crash.recorder-exported-twice", severity="note", file=part.path, other=twin.path
-            )
-        )
+        add_note(findings, "crash.recorder-exported-twice", file=part.path, other=twin.path)
     return [p for p in parts if p in kept], skipped, findings
 
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from strapdown._kernels import crash_events as kernel
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import Acceleration, window_weights
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_warning, check_choice
 from strapdown.tables.checks import Array
 from strapdown.tables.imu import SAMPLINGS
 from strapdown.units import SPEEDS
@@ -292,42 +292,39 @@ def _last_change(acceleration: Acceleration, rule: EventRule) -> float:
 
 
 def _findings(event: CrashEvent, acceleration: Acceleration, rule: EventRule) -> list[Finding]:
-    found = []
+    found: list[Finding] = []
     source = acceleration.source
     if event.starts_before_record:
-        found.append(
-            Finding(
-                BEGINS_WITHIN,
-                file=source,
-                quantity="time zero",
-                wake=rule.wake / KMH,
-                woken=event.woken - acceleration.begin,
-                begin=acceleration.begin,
-            )
+        add_warning(
+            found,
+            BEGINS_WITHIN,
+            file=source,
+            quantity="time zero",
+            wake=rule.wake / KMH,
+            woken=event.woken - acceleration.begin,
+            begin=acceleration.begin,
         )
     if event.lasts_beyond_record:
-        found.append(
-            Finding(
-                "crash.record-ends-after-time-zero",
-                file=source,
-                quantity="end of event",
-                end=acceleration.end,
-                end_2=acceleration.end - event.time_zero,
-                wake=rule.wake / KMH,
-                wake_window=rule.wake_window * 1000.0,
-            )
+        add_warning(
+            found,
+            "crash.record-ends-after-time-zero",
+            file=source,
+            quantity="end of event",
+            end=acceleration.end,
+            end_2=acceleration.end - event.time_zero,
+            wake=rule.wake / KMH,
+            wake_window=rule.wake_window * 1000.0,
         )
     for gap in acceleration.gaps(event.time_zero, event.end):
-        found.append(
-            Finding(
-                "crash.no-sample-ms-within-event",
-                file=source,
-                row=gap.sample + 1,
-                quantity="acceleration",
-                length=gap.length * 1000.0,
-                start=gap.start,
-                end=gap.end,
-            )
+        add_warning(
+            found,
+            "crash.no-sample-ms-within-event",
+            file=source,
+            row=gap.sample + 1,
+            quantity="acceleration",
+            length=gap.length * 1000.0,
+            start=gap.start,
+            end=gap.end,
         )
     return found
 

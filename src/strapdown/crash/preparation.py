@@ -14,7 +14,7 @@ from strapdown.crash.acceleration import force_at_rest
 from strapdown.crash.entry import Entry
 from strapdown.crash.measuring_point import PointKinematics, at_point
 from strapdown.crash.path import reconstruct_path
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_warning, check_choice
 from strapdown.rotation import level
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad, UnitArrays, check_unit
 from strapdown.sensors.pre_crash import (
@@ -584,29 +584,27 @@ def length_findings(unit: CrashUnit, rest: RestStretch, gravity: float) -> list[
             quantity="accel",
             length=length,
         )
-    found = []
+    found: list[Finding] = []
     if mean[2] > 0.5 * gravity:
-        found.append(
-            Finding(
-                "crash.specific-force-rest-along-vehicle",
-                file=f"{unit.name}, {lowest.name}",
-                quantity="accel_z",
-                mean=mean[2],
-            )
+        add_warning(
+            found,
+            "crash.specific-force-rest-along-vehicle",
+            file=f"{unit.name}, {lowest.name}",
+            quantity="accel_z",
+            mean=mean[2],
         )
     u = lowest.uncertainty
     stated = float(np.hypot(max(u.axis("bias")), gravity * max(u.axis("scale"))))
     if stated > 0.0 and abs(length - gravity) > SIGMAS * stated and 8.0 < length < 11.6:
-        found.append(
-            Finding(
-                "crash.specific-force-rest-long-off",
-                file=f"{unit.name}, {lowest.name}",
-                quantity="accel",
-                length=length,
-                length_2=length - gravity,
-                length_3=abs(length - gravity) / stated,
-                stated=stated,
-            )
+        add_warning(
+            found,
+            "crash.specific-force-rest-long-off",
+            file=f"{unit.name}, {lowest.name}",
+            quantity="accel",
+            length=length,
+            length_2=length - gravity,
+            length_3=abs(length - gravity) / stated,
+            stated=stated,
         )
     return found
 
@@ -617,22 +615,21 @@ def saturation_findings(
     """Report clipping of the last range or the gyro, and ranges unlike the stated ones."""
     assert unit.gyro is not None
     triads = [*zip(unit.accelerometers, limits, strict=True), (unit.gyro, gyro_limits)]
-    found = []
+    found: list[Finding] = []
     for j, (triad, limit) in enumerate(triads):
         kind, u = ("accel", "m/s²") if j < len(limits) else ("gyro", "rad/s")
         file, stated = f"{unit.name}, {triad.name}", triad.uncertainty.axis("full_scale")
         for k, axis in enumerate("xyz"):
             here: dict[str, Any] = {"file": file, "quantity": f"{kind}_{axis}"}
             if limit.found[k]:
-                found.append(
-                    Finding(
-                        "crash.held-between-stated-full-scale",
-                        **here,
-                        lower=limit.lower[k],
-                        upper=limit.upper[k],
-                        u=u,
-                        stated=stated[k],
-                    )
+                add_warning(
+                    found,
+                    "crash.held-between-stated-full-scale",
+                    **here,
+                    lower=limit.lower[k],
+                    upper=limit.upper[k],
+                    u=u,
+                    stated=stated[k],
                 )
             if limit.beyond[k]:
                 code = "crash.reads-more-than-stated-full"
@@ -641,15 +638,14 @@ def saturation_findings(
             rows = np.flatnonzero(limit.clipped[:, k])
             # A wider range holds what ends a lower one.
             if rows.size and j + 1 >= len(limits):
-                found.append(
-                    Finding(
-                        f"crash.{kind}-clipped",
-                        file=file,
-                        quantity=f"{kind}_{axis}",
-                        count=rows.size,
-                        first=data.time[rows[0]],
-                        last=data.time[rows[-1]],
-                    )
+                add_warning(
+                    found,
+                    f"crash.{kind}-clipped",
+                    file=file,
+                    quantity=f"{kind}_{axis}",
+                    count=rows.size,
+                    first=data.time[rows[0]],
+                    last=data.time[rows[-1]],
                 )
     return found
 
@@ -661,21 +657,20 @@ def bias_findings(
     rest: RestStretch | None,
 ) -> list[Finding]:
     """Report a bias that could not be estimated, or exceeds the stated one."""
-    found = []
+    found: list[Finding] = []
     for j in range(1, len(bias)):
         triad = unit.accelerometers[j]
         source = f"{unit.name}, {triad.name}"
         if bias_from[j] is None:
-            found.append(
-                Finding(
-                    "crash.bias-unknown-without-rest"
-                    if rest is None
-                    else "crash.bias-unknown-range-at-end",
-                    file=source,
-                    quantity="bias",
-                    name=unit.accelerometers[j - 1].name,
-                    sd=max(triad.uncertainty.axis("bias")),
-                )
+            add_warning(
+                found,
+                "crash.bias-unknown-without-rest"
+                if rest is None
+                else "crash.bias-unknown-range-at-end",
+                file=source,
+                quantity="bias",
+                name=unit.accelerometers[j - 1].name,
+                sd=max(triad.uncertainty.axis("bias")),
             )
             continue
         own = bias[j] - bias[j - 1]
@@ -684,23 +679,22 @@ def bias_findings(
         )
         for k, axis in enumerate("xyz"):
             if stated[k] > 0.0 and abs(own[k]) > SIGMAS * stated[k]:
-                found.append(
-                    Finding(
-                        "crash.bias-against-times-stated",
-                        file=source,
-                        quantity=f"accel_{axis}",
-                        own=own[k],
-                        name=unit.accelerometers[j - 1].name,
-                        own_2=abs(own[k]) / stated[k],
-                        stated=stated[k],
-                    )
+                add_warning(
+                    found,
+                    "crash.bias-against-times-stated",
+                    file=source,
+                    quantity=f"accel_{axis}",
+                    own=own[k],
+                    name=unit.accelerometers[j - 1].name,
+                    own_2=abs(own[k]) / stated[k],
+                    stated=stated[k],
                 )
     return found
 
 
 def step_findings(unit: CrashUnit, merged: MergedRanges) -> list[Finding]:
     """Report ranges that differ where one takes over from the other."""
-    found = []
+    found: list[Finding] = []
     largest = np.abs(merged.values).max(axis=0)
     for j in range(len(merged.step)):
         low, high = unit.accelerometers[j], unit.accelerometers[j + 1]
@@ -719,16 +713,15 @@ def step_findings(unit: CrashUnit, merged: MergedRanges) -> list[Finding]:
             own = max(float(np.hypot(scale, aside)), LEAST_STEP * level)
             sd = float(np.hypot(merged.step_sd[j, k], own))
             if abs(merged.step[j, k]) > SIGMAS * sd:
-                found.append(
-                    Finding(
-                        "crash.take-over-another-they-differ",
-                        file=unit.name,
-                        quantity=f"accel_{axis}",
-                        name=low.name,
-                        name_2=high.name,
-                        step=merged.step[j, k],
-                        switches=merged.switches[j, k],
-                        step_2=abs(merged.step[j, k]) / sd,
-                    )
+                add_warning(
+                    found,
+                    "crash.take-over-another-they-differ",
+                    file=unit.name,
+                    quantity=f"accel_{axis}",
+                    name=low.name,
+                    name_2=high.name,
+                    step=merged.step[j, k],
+                    switches=merged.switches[j, k],
+                    step_2=abs(merged.step[j, k]) / sd,
                 )
     return found

@@ -31,7 +31,6 @@ from strapdown.crash.delta_v_bound import (
     resolved_delta_v_bound,
     velocity_change,
 )
-from strapdown.crash.detectability import undetectable
 from strapdown.crash.entry import Entry, EntryState
 from strapdown.crash.events import (
     BEGINS_WITHIN,
@@ -44,7 +43,7 @@ from strapdown.crash.events import (
 from strapdown.crash.measuring_point import PointKinematics
 from strapdown.crash.path import VELOCITY, CrashPath, path_line, reconstruct_path
 from strapdown.crash.preparation import prepare_together
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_warning
 from strapdown.mechanization import NorthEastDown
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.synchronise import SynchronisedUnits, synchronise
@@ -55,6 +54,16 @@ from strapdown.tables.checks import Array
 
 if TYPE_CHECKING:
     from strapdown.crash.drive_entry import DriveEntry
+
+
+from strapdown.crash.consistency import (
+    VelocityIncrements,
+    body_turning,
+    clipped_pieces,
+    compare_pair,
+    velocity_increments,
+)
+from strapdown.crash.structure import unlearnt
 
 Row = tuple[str, str, float, float, float]
 
@@ -334,13 +343,12 @@ def reconstruct_unit(
     blind = [axis for axis in at_point.assumed_axes if axis in ("forward", "right")]
     if blind and not events.events:
         # An impact along an assumed axis is not among the events.
-        findings.append(
-            Finding(
-                "crash.impact-along-would-not-show",
-                file=at_point.name,
-                quantity="delta-V",
-                blind=blind,
-            )
+        add_warning(
+            findings,
+            "crash.impact-along-would-not-show",
+            file=at_point.name,
+            quantity="delta-V",
+            blind=blind,
         )
     for k, event in enumerate(events.events):
         between = (
@@ -350,14 +358,13 @@ def reconstruct_unit(
         contact = find_contact(acceleration, event, options.rule, noise=noise, between=between)
         start, end = contact.start.time, contact.end.time
         if end > at_point.assumed_until:
-            findings.append(
-                Finding(
-                    "crash.event-beyond-assumed-turning",
-                    file=at_point.name,
-                    quantity="delta-V",
-                    end=end,
-                    until=at_point.assumed_until,
-                )
+            add_warning(
+                findings,
+                "crash.event-beyond-assumed-turning",
+                file=at_point.name,
+                quantity="delta-V",
+                end=end,
+                until=at_point.assumed_until,
             )
         low = min(start + peak_window, end)
         peak = trailing_delta_v(acceleration, peak_window, low, end).peak
@@ -385,15 +392,14 @@ def reconstruct_unit(
         over, of_event = changes
         together = math.hypot(over.resultant_bound, of_event.resultant_bound)
         if not of_event.at_least and over.resultant - of_event.resultant > together:
-            findings.append(
-                Finding(
-                    "crash.window-exceeds-event",
-                    file=at_point.name,
-                    quantity="delta-V",
-                    length=1e3 * peak_window,
-                    peak=over.resultant,
-                    whole=of_event.resultant,
-                )
+            add_warning(
+                findings,
+                "crash.window-exceeds-event",
+                file=at_point.name,
+                quantity="delta-V",
+                length=1e3 * peak_window,
+                peak=over.resultant,
+                whole=of_event.resultant,
             )
         if changes[1].at_least:
             findings.append(_at_least(changes[1], at_point.name))
@@ -415,16 +421,15 @@ def reconstruct_unit(
             ned.append(EventChanges(changes[0], changes[1], contact))
         else:
             ned.append(None)
-            findings.append(
-                Finding(
-                    "crash.event-not-within-path-change",
-                    file=at_point.name,
-                    quantity="window",
-                    start=start,
-                    end=end,
-                    time=path.time[0],
-                    time_2=path.time[-1],
-                )
+            add_warning(
+                findings,
+                "crash.event-not-within-path-change",
+                file=at_point.name,
+                quantity="window",
+                start=start,
+                end=end,
+                time=path.time[0],
+                time_2=path.time[-1],
             )
     # An assumed roll gives no information on a rollover.
     roll = None
@@ -526,15 +531,14 @@ def entry_findings(
     # is at the end of the window, and the first contact up to one window after time zero.
     if events.events and events.events[0].time_zero + events.rule.wake_window < entry.time:
         first = events.events[0].time_zero
-        found.append(
-            Finding(
-                "crash.stated-crash-began-ms-before",
-                file=at_point.name,
-                quantity="entry",
-                time=entry.time,
-                time_2=1000.0 * (entry.time - first),
-                first=first,
-            )
+        add_warning(
+            found,
+            "crash.stated-crash-began-ms-before",
+            file=at_point.name,
+            quantity="entry",
+            time=entry.time,
+            time_2=1000.0 * (entry.time - first),
+            first=first,
         )
         # Its speed may differ from that at the beginning.
         return found
@@ -554,18 +558,17 @@ def entry_findings(
     speed, sd = _speed(path, k)
     felt, felt_sd = _speed(driven, j)
     if abs(speed - felt) > SIGMAS * float(np.hypot(sd, felt_sd)):
-        found.append(
-            Finding(
-                "crash.rest-until-record-itself-comes",
-                file=at_point.name,
-                quantity="entry speed",
-                speed=speed,
-                sd=1.96 * sd,
-                time=entry.time,
-                end=rest.end,
-                felt=felt,
-                felt_sd=1.96 * felt_sd,
-            )
+        add_warning(
+            found,
+            "crash.rest-until-record-itself-comes",
+            file=at_point.name,
+            quantity="entry speed",
+            speed=speed,
+            sd=1.96 * sd,
+            time=entry.time,
+            end=rest.end,
+            felt=felt,
+            felt_sd=1.96 * felt_sd,
         )
     return found
 
@@ -773,8 +776,8 @@ def _reconstructed(
         findings += [*comparison.findings, *hidden]
         if combine and not comparison.agree:
             names = ", ".join(u.name for u in there)
-            findings.append(
-                Finding("crash.units-disagree-no-mean-told", file=names, quantity="combine")
+            add_warning(
+                findings, "crash.units-disagree-no-mean-told", file=names, quantity="combine"
             )
     x, y, z = (float(v) for v in point)
     return CrashReconstruction(
@@ -815,3 +818,84 @@ def _wrong_type(quantity: str, given: object) -> ConfigError:
     return ConfigError(
         f"crash.{quantity}-of-wrong-type", quantity=quantity, type=type(given).__name__
     )
+
+
+# Errors of one measuring point that a comparison with the others would not show.
+
+#: A gross scale factor, a position and a mounting that a tape and an eye would make.
+SCALE, POSITION, TURNED_DEG = 1.25, 0.25, 5.0
+
+
+def wrong_ones(one: VelocityIncrements) -> dict[str, VelocityIncrements]:
+    """Increments of a unit with each of the errors that are tried, by the codes of their names."""
+    opposite = np.eye(3)
+    # Along the horizontal axis that changed most.
+    main = int(np.argmax(np.abs(one.values[:, :2].sum(axis=0))))
+    opposite[main, main] = -1.0
+    values = {
+        "crash.wrong-sign": one.values @ opposite.T,
+        "crash.wrong-axes": one.values @ np.eye(3)[[1, 0, 2]].T,
+        "crash.wrong-scale": one.values @ np.diag([SCALE, SCALE, 1.0]).T,
+        "crash.wrong-position": one.values,
+        "crash.wrong-heading": one.values
+        @ rotation.dcm_from_rotation_vector([0.0, 0.0, np.radians(TURNED_DEG)]).T,
+    }
+    turning = body_turning((one,))
+    if turning is not None:
+        off = (turning.lever @ (POSITION * np.array([1.0, 1.0, 0.0]))).reshape(-1, 3)
+        values["crash.wrong-position"] = one.values + off
+    return {code: replace(one, values=moved) for code, moved in values.items()}
+
+
+def undetectable(
+    units: Sequence[PointKinematics], comparison: UnitComparison, level: float = 1e-3
+) -> list[Finding]:
+    """State the errors that a comparison of agreeing units would not detect.
+
+    Each of `wrong_ones` is put into the record of one unit after another, which is then compared
+    with the others as in `compare_units`, structure and turning learnt anew. One that a unit could
+    have without a contradiction is listed. Errors common to all units never show: their records
+    are those of another crash.
+
+    Parameters
+    ----------
+    units : sequence of PointKinematics
+        As compared.
+    comparison : UnitComparison
+    level : float
+        Probability below which a pair disagrees.
+
+    Returns
+    -------
+    list of Finding
+        One note, or none where the units disagree.
+    """
+    if not comparison.agree:
+        return []
+    edges, rigid = comparison.edges, unlearnt(units)
+    increments = [velocity_increments(u, edges) for u in units]
+    cut = [clipped_pieces(u, edges) for u in units]
+    tried = [wrong_ones(one) for one in increments]
+    hidden = []
+    for code in tried[0]:
+        for k, unit in enumerate(units):
+            pairs = (
+                compare_pair(
+                    *(unit, other, tried[k][code], increments[j], ~(cut[k] | cut[j]), level, rigid),
+                    explained=False,
+                )
+                for j, other in enumerate(units)
+                if j != k
+            )
+            if all(p.agree and all(f.severity == "note" for f in p.findings) for p in pairs):
+                hidden.append(Finding(code, severity="note"))
+                break
+    return [
+        Finding(
+            "crash.not-detectable-with-these-points",
+            severity="note",
+            file=", ".join(u.name for u in units),
+            quantity="comparison",
+            hidden=[*hidden, Finding("crash.wrong-alike", severity="note")],
+        )
+    ]

@@ -12,7 +12,7 @@ import numpy as np
 
 from strapdown.config.toml_file import KeyPath, TomlFile, read_toml
 from strapdown.dsp.chi_square import normal_quantile
-from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, add_warning, check_choice
 from strapdown.units import SPEEDS as ALL_SPEEDS
 
 #: Units of speed, in m/s. Inputs with these units are given in m/s; others in their stated unit.
@@ -260,17 +260,16 @@ def _validity(
     reach: float,
     outside: str,
 ) -> list[Finding]:
-    findings = []
+    findings: list[Finding] = []
     for name, categories in model.applies.items():
         if name not in inputs:
-            findings.append(
-                Finding(
-                    "crash.not-stated",
-                    quantity=name,
-                    name=model.name,
-                    categories=categories,
-                    name_2=name,
-                )
+            add_warning(
+                findings,
+                "crash.not-stated",
+                quantity=name,
+                name=model.name,
+                categories=categories,
+                name_2=name,
             )
         elif inputs[name] not in categories:
             said = {"name": model.name, "categories": categories, "category": inputs[name]}
@@ -283,9 +282,7 @@ def _validity(
         if not low <= value <= high:
             findings.append(_outside("crash.outside-model-range", name, outside, **said))
         elif not low <= value - error <= value + error <= high:
-            findings.append(
-                Finding("crash.bound-leaves-range", quantity=name, error=error, data=said)
-            )
+            add_warning(findings, "crash.bound-leaves-range", quantity=name, error=error, data=said)
     return findings
 
 

@@ -20,7 +20,7 @@ import pandas as pd
 
 from strapdown import rotation
 from strapdown.config.toml_text import (
-    Asked,
+    Draft,
     Page,
     array,
     inline,
@@ -62,23 +62,6 @@ from strapdown.sensors.saturation import find_limits
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import Array
 from strapdown.units import GYRO_UNITS
-
-
-@dataclass(frozen=True)
-class Draft:
-    """Proposed case file: text, lines for the user, questions, consequences to confirm.
-
-    `vehicle`: its number, empty where the records do not number vehicles; `name` as they state it.
-    """
-
-    text: str
-    found: tuple[str, ...]
-    asked: tuple[Asked, ...]
-    to_check: tuple[Asked, ...] = ()
-    left_out: tuple[Skipped, ...] = ()
-    findings: tuple[Finding, ...] = ()
-    vehicle: str = ""
-    name: str = ""
 
 
 def read_records(paths: Sequence[str | Path]) -> list[CrashRecord]:
@@ -261,10 +244,10 @@ def draft_cases(
                 (*map(_told, of_vehicle), *lines),
                 tuple(page.asked),
                 tuple(page.to_check),
-                left_out,
                 (*findings, *against),
-                vehicle,
-                plain(name),
+                vehicle=vehicle,
+                name=plain(name),
+                left_out=left_out,
             )
         )
     return tuple(drafts)
@@ -615,8 +598,7 @@ class Unit:
 
     def against_gravity(self) -> Finding:
         """Return the finding that gravity at rest contradicts the stated axes."""
-        data = {"axes": self.axes_stated, "unit": self.name}
-        return Finding("crash.axes-against-gravity", severity="warning", data=data)
+        return Finding("crash.axes-against-gravity", axes=self.axes_stated, unit=self.name)
 
     @property
     def place(self) -> str:

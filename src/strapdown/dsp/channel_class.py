@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown._kernels import signals
+from strapdown.constants import Array
 from strapdown.dsp.samples import as_channels, positive_step
 from strapdown.errors import ConfigError, DataError, check_choice
-
-Array = NDArray[np.float64]
-
 
 CHANNEL_CLASSES = (60, 180, 600, 1000)
 # Design frequency of one pass, divided by the class number.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from strapdown.constants import Array
 
 
 def chi_square_quantile(share: Any, freedom: Any) -> Any:

@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown._kernels import piecewise
-
-Array = NDArray[np.float64]
+from strapdown.constants import Array
 
 
 @dataclass(frozen=True, eq=False)

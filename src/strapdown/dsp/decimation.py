@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from strapdown.constants import Array, Flags
 from strapdown.dsp.derivative import LocalWeights, mirrored
 from strapdown.dsp.samples import as_channels, positive_step
 from strapdown.errors import ConfigError, DataError
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # Reserve: Kaiser's length formula is a fit, and a gain of exactly 1 at zero shifts the ripple of
 # the passband to one side.

@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import Array, Flags
 from strapdown.dsp.decimation import decimate, low_pass_design
 from strapdown.dsp.samples import as_channels, positive_step
 from strapdown.errors import DataError
-
-Array = NDArray[np.float64]
 
 # Rates above add noise and hardly any signal: structures of vehicles vibrate at 30 to 300 Hz.
 COMMON_RATE = 1000.0  # Hz
@@ -267,8 +266,6 @@ def _variance(slope: Array, residual: Array, width: float) -> float:
 
 
 # Correlation of two signals over their lags, with gaps, and its peaks.
-
-Flags = NDArray[np.bool_]
 
 
 def lag_correlation(

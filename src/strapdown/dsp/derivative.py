@@ -11,14 +11,11 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from strapdown.constants import Array, Indices
 from strapdown.errors import ConfigError, DataError
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-
-
-Array = NDArray[np.float64]
-
 
 # Value and slope of a polynomial fitted to a few samples, as weights of the samples.
 
@@ -173,8 +170,6 @@ def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0)
 
 
 # Outputs that are local weighted sums of samples, and their noise.
-
-Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

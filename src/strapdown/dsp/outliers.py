@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import Array
 from strapdown.dsp.samples import check_segment
 from strapdown.errors import ConfigError
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
 
 

@@ -8,10 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.constants import Array
 from strapdown.errors import ConfigError, DataError
-
-Array = NDArray[np.float64]
-
 
 # Stamps printed to a tenth of a step still count as an even grid.
 JITTER = 0.1

@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING
 from strapdown.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from strapdown.evaluation.position_references import dead_reckon
-    from strapdown.evaluation.trajectory_differences import ROTATION_ERROR, trajectory_differences
+    from strapdown.evaluation.position_references import dead_reckon as dead_reckon
+    from strapdown.evaluation.trajectory_differences import ROTATION_ERROR as ROTATION_ERROR
+    from strapdown.evaluation.trajectory_differences import (
+        trajectory_differences as trajectory_differences,
+    )
 
-__all__ = [
-    "ROTATION_ERROR",
-    "dead_reckon",
-    "trajectory_differences",
-]
 
 load_on_first_use(
     __name__,

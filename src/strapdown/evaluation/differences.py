@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
+from strapdown.constants import Flags
 from strapdown.dsp.samples import running_integral
 from strapdown.errors import Finding
 from strapdown.rotation import unit_rotation_angle
@@ -160,7 +161,6 @@ def rotation_contradicted(imu: pd.DataFrame, reference: pd.DataFrame) -> Finding
     return Finding(
         "evaluation.reference-rotates-otherwise",
         quantity="reference",
-        severity="warning",
         gyro_deg_s=float(np.degrees(gyro)),
         reference_deg_s=float(np.degrees(other)),
         windows=angles.shape[1],
@@ -170,7 +170,6 @@ def rotation_contradicted(imu: pd.DataFrame, reference: pd.DataFrame) -> Finding
 
 # Known attitude at the samples of a log.
 
-Mask = NDArray[np.bool_]
 
 #: The final error, its root mean square and the largest, in deg.
 Errors = tuple[float, float, float]
@@ -188,7 +187,7 @@ class Known:
     """
 
     q_nb: Array
-    counts: Mask
+    counts: Flags
 
     def at(self, samples: NDArray[np.int64]) -> Known:
         """Return the known attitude at some of the samples."""
@@ -209,7 +208,7 @@ def angles_to_errors(angles: Array) -> Errors:
     return float(angles[-1]), float(np.sqrt((angles * angles).mean())), float(angles.max())
 
 
-def known_at(truth: pd.DataFrame, scored: Mask, stamps: Array) -> Known:
+def known_at(truth: pd.DataFrame, scored: Flags, stamps: Array) -> Known:
     """Interpolate the scored rows of a truth at the samples of a log.
 
     A sample counts at the stamp of a scored row, or between scored rows at most three of the

@@ -361,7 +361,7 @@ class Leg:
         From the end of the first rest to the start of the second.
     velocity, position : ndarray, (n, 3), m/s and m
         From zero, along the axes of the run's local level.
-    velocity_corrected, position_corrected : ndarray, (n, 3)
+    position_corrected : ndarray, (n, 3), m
         With a velocity subtracted that grows in proportion to time and makes the last one zero:
         exact for an error of acceleration that is constant in the local level.
     gravity : float, m/s²
@@ -375,7 +375,6 @@ class Leg:
     time: Array
     velocity: Array
     position: Array
-    velocity_corrected: Array
     position_corrected: Array
     gravity: float
     velocity_by_bias: Array
@@ -459,7 +458,6 @@ def dead_reckon(
         time,
         velocity,
         position,
-        velocity - velocity[-1] * share,
         position - velocity[-1] * 0.5 * share * elapsed,
         g,
         *by_error,

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.attitude_algorithms import Quaternion, run_attitude
+from strapdown.constants import Triple
 from strapdown.dsp.delay import lag_correlation, repeats, top_peaks
 from strapdown.errors import DataError
 from strapdown.evaluation.differences import attitude_at
@@ -20,8 +21,6 @@ from strapdown.tables.checks import Array
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
-
-Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True)

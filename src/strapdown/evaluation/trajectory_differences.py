@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_warning
 from strapdown.frames import ecef_from_geodetic, geodetic_from_ecef, place_difference, q_ne
 from strapdown.tables import (
     EULER,
@@ -179,22 +179,21 @@ def _interpolated(time: Array, reference: pd.DataFrame, ellipsoid: Ellipsoid) ->
     if not time.size:
         return []
     source, stamps = reference.attrs.get("source"), reference.index.to_numpy(dtype=np.float64)
-    findings = []
+    findings: list[Finding] = []
     gaps = [g for g in find_gaps(stamps) if ((time > g.start) & (time < g.end)).any()]
     if gaps:
         longest = max(gaps, key=lambda g: g.length)
         count = sum(int(((time > g.start) & (time < g.end)).sum()) for g in gaps)
-        findings.append(
-            Finding(
-                "evaluation.instants-estimate-lie-gaps-reference",
-                file=source,
-                quantity="time",
-                count=count,
-                count_2=len(gaps),
-                length=longest.length,
-                start=longest.start,
-                usual=longest.usual,
-            )
+        add_warning(
+            findings,
+            "evaluation.instants-estimate-lie-gaps-reference",
+            file=source,
+            quantity="time",
+            count=count,
+            count_2=len(gaps),
+            length=longest.length,
+            start=longest.start,
+            usual=longest.usual,
         )
     first, last = np.searchsorted(stamps, [time[0], time[-1]])
     cost = interpolation_cost(reference.iloc[max(0, first - 2) : last + 2], ellipsoid)

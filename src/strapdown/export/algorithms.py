@@ -17,7 +17,7 @@ from strapdown import rotation
 from strapdown._kernels import arithmetic
 from strapdown.attitude_algorithms import AttitudeAlgorithm
 from strapdown.attitude_algorithms.cost import count_cost
-from strapdown.constants import CORTEX_M4F_CYCLES
+from strapdown.constants import CORTEX_M4F_CYCLES, Array
 from strapdown.errors import ConfigError, check_choice
 from strapdown.export.configuration import SensorConfiguration
 from strapdown.export.device import comment, device_translator, unpacked
@@ -25,7 +25,6 @@ from strapdown.export.kernels import Kernels
 from strapdown.export.program import (
     ROUNDINGS,
     SAMPLES,
-    Array,
     Vector,
     attitude_harness,
     attitude_test,

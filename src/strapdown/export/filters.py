@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown._kernels import arithmetic, orientation
-from strapdown.constants import CORTEX_M4F_CYCLES
+from strapdown.constants import CORTEX_M4F_CYCLES, Array
 from strapdown.errors import DataError
 from strapdown.export.algorithms import ANGLES
 from strapdown.export.configuration import SensorConfiguration
@@ -21,7 +21,6 @@ from strapdown.export.kernels import Kernels
 from strapdown.export.program import (
     ROUNDINGS,
     SAMPLES,
-    Array,
     Vector,
     attitude_harness,
     attitude_test,

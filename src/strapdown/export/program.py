@@ -9,15 +9,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from strapdown.constants import Array
 from strapdown.export.configuration import Channel, SensorConfiguration
 from strapdown.export.device import comment, number
 from strapdown.export.kernels import Kernels
 from strapdown.export.sources import Kernel
 from strapdown.export.types_of_c import WIDTH, wrapped
-
-Array = NDArray[np.float64]
 
 # Math functions with a macro for each precision.
 MACROS = (

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown.constants import STANDARD_GRAVITY, Array
 from strapdown.dsp.samples import constant_beside_noise
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.arrays import as_rows, epoch_of, numbers, open_dates, ticks_of
@@ -71,8 +71,6 @@ from strapdown.tables import ACCEL, GYRO, attitude_table, find_gaps, imu_of_colu
 from strapdown.tables.checks import IMPOSSIBLE_FORCE, IMPOSSIBLE_RATE, all_finite
 from strapdown.tables.on_disk import filled, let_go, room, step_range, stored
 from strapdown.units import DATE_ORDERS, TIME_UNITS, factor_of, parse_unit
-
-Array = NDArray[np.float64]
 
 
 def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Recording:

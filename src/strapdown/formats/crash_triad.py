@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from strapdown.constants import Array
 from strapdown.dsp.samples import constant_beside_noise
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.clocks import EPOCH
@@ -22,8 +22,6 @@ from strapdown.units import FACTORS, OF_CRASHES, TIME_UNITS, find_unit
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Array = NDArray[np.float64]
 
 _COLUMNS = {"acceleration": ACCEL, "rate": GYRO}
 _AXES = ("x", "y", "z")

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import Array
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.formats.arrays import STEP_OF_FIXES, is_stamp, numbers, ticks_of
 from strapdown.formats.clocks import clock_of_name
@@ -36,7 +37,6 @@ from strapdown.formats.vocabularies import (
 )
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, OF_TABLES, find_unit, unit_of
 
-Array = NDArray[np.float64]
 AXES = "xyz"
 
 

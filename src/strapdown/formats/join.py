@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import Array
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.find_columns import Column, find_columns, with_reversed
@@ -20,7 +21,6 @@ from strapdown.formats.vocabularies import QUANTITIES
 from strapdown.tables import find_gaps
 from strapdown.units import TIME_UNITS
 
-Array = NDArray[np.float64]
 AXES = "xyz"
 TRIADS = ("accel", "mag")
 # A sensor that covers a smaller fraction of the gyro's samples is dropped; if it covers more, the

@@ -15,12 +15,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.constants import Array
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.formats.columns import parse_axes
 from strapdown.tables import SAMPLINGS
 from strapdown.tables.checks import height_words
-
-Array = NDArray[np.float64]
 
 #: Codes that say that a recording does not have a stream, which is not a fault.
 ABSENT = {

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown.constants import STANDARD_GRAVITY, Array
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
 from strapdown.formats.arrays import as_rows, numbers
 from strapdown.formats.columns import parse_axes, read_name
@@ -34,7 +34,6 @@ from strapdown.units import (
     parse_unit,
 )
 
-Array = NDArray[np.float64]
 #: Units of a triad, and of its increments.
 UNITS = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "mag": MAG_UNITS}
 SUMS: dict[str, dict[str, float]] = {"gyro": GYRO_SUMS, "accel": ACCEL_SUMS, "mag": {}}

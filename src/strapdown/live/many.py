@@ -3,30 +3,406 @@
 from __future__ import annotations
 
 import asyncio
+import http.client
+import importlib
+import json
 import re
 import secrets
+import socket
 import tempfile
+import threading
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
+from urllib.parse import quote, unquote, urlsplit
 
 from strapdown.config.alignment import sensors_of
 from strapdown.errors import ConfigError, Finding
 from strapdown.formats.sensor_streams import ACCEL, GYRO, MAG, Event
-from strapdown.live.feeds import MqttFeed, PhyphoxFeed, SerialFeed, UdpFeed
 from strapdown.live.hub import Hub, StateWriter
+from strapdown.live.lines import BadLineError
+from strapdown.live.phones import phyphox_buffers, phyphox_events
 from strapdown.live.replay import MachineClock, RunClock
 from strapdown.live.run import until_a_signal
 from strapdown.live.session import Session, SessionOptions
-from strapdown.live.web import WebReceiver, listening_socket
+from strapdown.live.sources import LONGEST, MARK
+from strapdown.live.web import WebReceiver, listening_socket, split_address
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.systems.navigation_run import make_chain
 from strapdown.systems.one_thread import one_thread
 
+# Other receivers of `strapdown live`: datagrams, a serial port, phyphox, and MQTT.
+
+Warn = Callable[[Finding], None]
+#: Bytes of datagrams that may wait in the system.
+WAITING = 8 << 20
+#: Interval at which a thread looks whether to stop, and after which it tries again, s.
+LOOK, AGAIN = 0.2, 1.0
+
+
+class UdpFeed(asyncio.DatagramProtocol):
+    """Lines in datagrams, ours or those of Sensorstream, a session for each address.
+
+    Parameters
+    ----------
+    where : str
+        ``HOST:PORT``; a port alone is of this machine only.
+    """
+
+    def __init__(self, hub: Hub, where: str) -> None:
+        self._hub = hub
+        self._host, self._port = split_address(where, "--udp")
+        self._transport: asyncio.DatagramTransport | None = None
+        self.name = ""
+
+    async def begin(self) -> None:
+        """Start to receive; ConfigError: the address cannot be opened."""
+        loop = asyncio.get_running_loop()
+        try:
+            self._transport, _ = await loop.create_datagram_endpoint(
+                lambda: self, local_addr=(self._host, self._port)
+            )
+            bound = self._transport.get_extra_info("socket")
+            # As much as the system allows: what comes while it is busy waits there.
+            bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WAITING)
+        except OSError as error:
+            raise ConfigError(
+                "live.cannot-listen", quantity="--udp", reason=error.strerror or error
+            ) from None
+        host, port = self._transport.get_extra_info("sockname")[:2]
+        self.name = f"udp://{host}:{port}"
+
+    async def end(self) -> None:
+        """Stop receiving."""
+        if self._transport is not None:
+            self._transport.close()
+
+    def datagram_received(self, data: bytes, addr: tuple[str | Any, int]) -> None:
+        """Take a datagram, which ends with a whole line."""
+        arrived = self._hub.clock.now()
+        for line in data.split(b"\n"):
+            if line.strip():
+                self._hub.line(_text(line), "udp", str(addr[0]), arrived)
+
+    def error_received(self, exc: Exception) -> None:
+        """Ignore what the system says of datagrams that were never sent."""
+
+
+def _text(line: bytes) -> str:
+    """Return a line as text; one that is too long as one that no parser accepts."""
+    return ((MARK + line[:64]) if len(line) > LONGEST else line).decode("utf-8", "replace")
+
+
+class _Threaded(ABC):
+    """A receiver in a thread of its own."""
+
+    name: str
+
+    def __init__(self, hub: Hub, warn: Warn) -> None:
+        self._hub, self._warn = hub, warn
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._told = ""
+
+    async def begin(self) -> None:
+        """Start to receive."""
+        self._thread.start()
+
+    async def end(self) -> None:
+        """Stop receiving."""
+        self._stop.set()
+        await asyncio.to_thread(self._thread.join, 5.0)
+
+    @abstractmethod
+    def _run(self) -> None:
+        """Receive until `_stop` is set."""
+
+    def _say(self, code: str, **data: Any) -> None:
+        """Warn once of what lasts."""
+        said = f"{code} {data}"
+        if said != self._told:
+            self._told = said
+            self._hub.post(self._warn, Finding(code, **data))
+
+
+class SerialFeed(_Threaded):
+    """Lines of a serial port: ours, or the rows of a table with a header.
+
+    Parameters
+    ----------
+    where : str
+        ``PORT`` or ``PORT@BAUD``: ``/dev/ttyUSB0@460800``, ``COM3``.
+    """
+
+    def __init__(self, hub: Hub, where: str, warn: Warn) -> None:
+        super().__init__(hub, warn)
+        try:
+            self._serial = importlib.import_module("serial")
+        except ImportError:
+            raise ConfigError(
+                "live.library-missing", quantity="--serial", library="pyserial", extra="live"
+            ) from None
+        port, _, baud = where.rpartition("@") if "@" in where else (where, "", "115200")
+        if not port or not (baud.isascii() and baud.isdecimal() and 0 < int(baud) < 10**8):
+            raise ConfigError("live.not-a-port", quantity="--serial", where=where)
+        self._port, self._baud, self.name = port, int(baud), f"serial:{port}"
+        try:
+            self._open: Any = self._opened()
+        except (OSError, ValueError) as error:
+            raise ConfigError("live.cannot-open", quantity="--serial", reason=str(error)) from None
+
+    def _opened(self) -> Any:
+        # Also without a port that the system lists: pseudo terminals and adapters.
+        return self._serial.serial_for_url(self._port, baudrate=self._baud, timeout=LOOK)
+
+    def _run(self) -> None:
+        rest, cut = b"", True  # the first line may have begun before
+        while not self._stop.is_set():
+            try:
+                if self._open is None:
+                    self._open = self._opened()
+                    rest, cut = b"", True
+                data = self._open.read(1)
+                data += self._open.read(self._open.in_waiting)
+            except (OSError, ValueError, TypeError) as error:
+                self._say("live.source-lost", file=self.name, reason=str(error)[:200])
+                self._close()
+                self._stop.wait(AGAIN)
+                continue
+            if not data:
+                continue
+            self._told = ""
+            arrived = self._hub.clock.now()
+            *lines, rest = (rest + data).split(b"\n")
+            if lines and cut and not _whole(lines[0]):
+                lines = lines[1:]
+            cut = cut and not lines
+            for line in lines:
+                if line.strip():
+                    self._hub.post(self._hub.line, _text(line), "serial", self._port, arrived)
+            if len(rest) > LONGEST:
+                rest, cut = b"", True
+        self._close()
+
+    def _close(self) -> None:
+        if self._open is not None:
+            with suppress(OSError):
+                self._open.close()
+            self._open = None
+
+
+def _whole(line: bytes) -> bool:
+    """Whether a first line begins as a line does: with a word, or a header."""
+    return line[:1].isalpha() or line[:1] in (b"#", b'"')
+
+
+class PhyphoxFeed(_Threaded):
+    """Poll a phone with phyphox and "Allow remote access", for what is new.
+
+    Parameters
+    ----------
+    where : str
+        ``HOST`` or ``HOST:PORT`` as the app shows it; 8080 without a port.
+    """
+
+    #: Between two answers, s: the server of the app has one thread.
+    PAUSE = 0.02
+    TIMEOUT = 3.0
+    #: Largest answer, bytes.
+    MOST = 16 << 20
+
+    def __init__(self, hub: Hub, where: str, warn: Warn) -> None:
+        super().__init__(hub, warn)
+        plain = where.removeprefix("http://").rstrip("/")
+        self._host, self._port = split_address(plain, "--phyphox", 8080)
+        self.name = f"phyphox://{self._host}:{self._port}"
+        self._recording, self._buffers = "", phyphox_buffers(None)
+        self._newest: dict[int, float] = {}
+
+    def _run(self) -> None:
+        known = False
+        while not self._stop.is_set():
+            try:
+                if not known:
+                    self._configure()
+                    known = True
+                known = self._poll()
+                self._told = ""
+            except BadLineError as bad:
+                self._say("live.source-not-understood", file=self.name, reason=bad.finding)
+                known = False
+                self._stop.wait(AGAIN)
+            except (OSError, http.client.HTTPException) as error:
+                reason = (str(error) or type(error).__name__)[:200]
+                self._say("live.source-lost", file=self.name, reason=reason)
+                self._stop.wait(AGAIN)
+            self._stop.wait(self.PAUSE)
+
+    def _configure(self) -> None:
+        """Find the buffers of the experiment; apps before 1.1.6 do not state them."""
+        try:
+            config = self._ask("/config")
+        except BadLineError:
+            config = None
+        self._buffers = phyphox_buffers(config)
+
+    def _poll(self) -> bool:
+        """Ask for what is new; return whether the experiment is still the same."""
+        asked = []
+        for kind, (x, y, z, t) in self._buffers.items():
+            since = self._newest.get(kind)
+            after = "full" if since is None else f"{since!r}"
+            asked.append(f"{quote(t)}={after}")
+            for name in (x, y, z):
+                value = after if since is None else f"{after}%7C{quote(t)}"
+                asked.append(f"{quote(name)}={value}")
+        answer = self._ask("/get?" + "&".join(asked))
+        arrived = self._hub.clock.now()
+        if not isinstance(answer, dict):
+            raise BadLineError("answer", "live.answer-not-understood")
+        status = answer.get("status")
+        recording = str(status.get("session", "")) if isinstance(status, dict) else ""
+        if recording != self._recording:
+            # Another experiment, whose buffers begin anew.
+            first, self._recording = not self._recording, recording[:200]
+            self._newest.clear()
+            if not first:
+                return False
+            if asked and "full" not in asked[0]:
+                return True
+        if not self._newest and isinstance(held := answer.get("buffer"), dict):
+            # Of names that were tried, those of this experiment.
+            own = {kind: names for kind, names in self._buffers.items() if set(names) <= set(held)}
+            self._buffers = own or self._buffers
+        if self._was_cleared(answer):
+            self._newest.clear()
+            return True
+        events = phyphox_events(answer, self._buffers, self._newest)
+        device = f"{self._host}-{self._port}"
+        self._hub.post(self._hub.events, events, "phyphox", device, self._recording, arrived)
+        return True
+
+    def _was_cleared(self, answer: Any) -> bool:
+        """Whether stamps begin anew: the measurement was cleared and started again.
+
+        The app then finds no stamp above the last one, until time is there again: it is asked for
+        the last stamp alone, now and then.
+        """
+        if not self._newest or not isinstance(answer, dict):
+            return False
+        held = answer.get("buffer")
+        if not isinstance(held, dict) or any(
+            isinstance(one, dict) and one.get("buffer") for one in held.values()
+        ):
+            return False
+        kind, (_, _, _, t) = next(iter(self._buffers.items()))
+        last = self._ask(f"/get?{quote(t)}")
+        held = last.get("buffer", {}) if isinstance(last, dict) else {}
+        one = held.get(t) if isinstance(held, dict) else None
+        values = one.get("buffer") if isinstance(one, dict) else None
+        if not isinstance(values, list) or not values or not isinstance(values[-1], int | float):
+            return False
+        return bool(values[-1] < self._newest.get(kind, -1.0) - 1.0)
+
+    def _ask(self, path: str) -> Any:
+        """Return the JSON of an answer; BadLineError: it has none."""
+        link = http.client.HTTPConnection(self._host, self._port, timeout=self.TIMEOUT)
+        try:
+            link.request("GET", path, headers={"Connection": "close"})
+            answer = link.getresponse()
+            data = answer.read(self.MOST + 1)
+            status = answer.status
+        finally:
+            link.close()
+        if status != 200 or len(data) > self.MOST:
+            raise BadLineError("answer", "live.answer-not-understood")
+        try:
+            return json.loads(data)
+        except (ValueError, RecursionError):
+            raise BadLineError("answer", "live.answer-not-understood") from None
+
+
+class MqttFeed(_Threaded):
+    """Messages of Sensor Logger from a topic of an MQTT broker.
+
+    Parameters
+    ----------
+    where : str
+        ``mqtt://HOST:PORT/TOPIC``, ``mqtts://…`` with TLS, ``ws://…`` and ``wss://…`` over
+        WebSocket, which the app itself needs; the topic is ``sensor-logger`` if not given.
+    user, password : str, optional
+    """
+
+    PORTS: ClassVar[dict[str, int]] = {"mqtt": 1883, "mqtts": 8883, "ws": 8000, "wss": 8884}
+
+    def __init__(
+        self, hub: Hub, where: str, warn: Warn, user: str | None = None, password: str | None = None
+    ) -> None:
+        super().__init__(hub, warn)
+        try:
+            self._mqtt = importlib.import_module("paho.mqtt.client")
+        except ImportError:
+            raise ConfigError(
+                "live.library-missing", quantity="--mqtt", library="paho-mqtt", extra="mqtt"
+            ) from None
+        try:
+            parts = urlsplit(where)
+            host, port = parts.hostname, parts.port
+        except ValueError:
+            parts, host, port = urlsplit(""), None, None
+        if parts.scheme not in self.PORTS or not host or parts.password or parts.username:
+            raise ConfigError("live.not-a-broker", quantity="--mqtt", where=where)
+        self._host, self._port = host, port or self.PORTS[parts.scheme]
+        self._topic = unquote(parts.path.strip("/")) or "sensor-logger"
+        self.name = f"{parts.scheme}://{self._host}:{self._port}/{self._topic}"
+        self._client = self._mqtt.Client(
+            self._mqtt.CallbackAPIVersion.VERSION2,
+            transport="websockets" if parts.scheme.startswith("ws") else "tcp",
+            reconnect_on_failure=True,
+        )
+        if parts.scheme in ("mqtts", "wss"):
+            self._client.tls_set()
+        if user is not None:
+            self._client.username_pw_set(user, password)
+        self._client.on_connect = self._connected
+        self._client.on_message = self._came
+
+    def _connected(self, client: Any, data: Any, flags: Any, reason: Any, extra: Any) -> None:
+        if reason.is_failure:
+            self._say("live.source-lost", file=self.name, reason=str(reason))
+            return
+        self._told = ""
+        client.subscribe(self._topic, qos=0)
+
+    def _came(self, client: Any, data: Any, message: Any) -> None:
+        arrived = self._hub.clock.now()
+        if len(message.payload) <= 4 << 20:
+            payload = bytes(message.payload)
+            self._hub.post(self._hub.sensor_logger, payload, "mqtt", arrived)
+
+    def _run(self) -> None:
+        connected = False
+        while not self._stop.is_set():
+            try:
+                if not connected:
+                    self._client.connect(self._host, self._port, keepalive=30)
+                    connected = True
+                if self._client.loop(timeout=LOOK) != self._mqtt.MQTT_ERR_SUCCESS:
+                    self._say("live.source-lost", file=self.name, reason="the broker closed")
+                    connected = False
+                    self._stop.wait(AGAIN)
+            except (OSError, ValueError, self._mqtt.WebsocketConnectionError) as error:
+                self._say("live.source-lost", file=self.name, reason=str(error)[:200])
+                connected = False
+                self._stop.wait(AGAIN)
+        self._client.disconnect()
+
+
 #: Interval at which the run looks whether it ends, s.
-LOOK = 0.1
+POLL = 0.1
 
 
 @dataclass(frozen=True)
@@ -172,7 +548,7 @@ async def _run(
         while wanted() and hub.writer.there and hub.error is None:
             if end is not None and hub.clock.now() >= end:
                 break
-            await asyncio.sleep(LOOK)
+            await asyncio.sleep(POLL)
             looks += 1
             hub.report_silent()
             if looks % 100 == 0:

@@ -175,7 +175,7 @@ class SensorLoggerDevice:
                 self._sign = math.copysign(1.0, down)
                 system = "Android" if down > 0.0 else "iOS"
                 code = "live.platform-not-stated"
-                self.findings.append(Finding(code, severity="warning", system=system))
+                self.findings.append(Finding(code, system=system))
                 return
 
     def _event(self, entry: Any) -> Event | None:

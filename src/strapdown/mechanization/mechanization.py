@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NoReturn
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown._kernels import earth as kernel
 from strapdown._kernels.earth import RATE
@@ -26,13 +26,12 @@ from strapdown._kernels.ned import (
     reverse_increments,
     trajectory_rows,
 )
+from strapdown.constants import Array
 from strapdown.ellipsoids import WGS84, Ellipsoid, find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding, check_choice
 from strapdown.nav_state import NavState
 from strapdown.tables import MOTION, TRAJECTORY, check_trajectory
 from strapdown.tables.checks import is_number, values_of
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 
 from strapdown._kernels import ned as kernel
 from strapdown._kernels.sample import ned_update
+from strapdown.constants import Array
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.mechanization.mechanization import Array, Mechanization
+from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 
 

@@ -9,8 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from strapdown._kernels import ned_simplified as kernel
+from strapdown.constants import Array
 from strapdown.errors import ConfigError
-from strapdown.mechanization.mechanization import Array, Mechanization
+from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 
 

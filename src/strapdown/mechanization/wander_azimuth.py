@@ -15,9 +15,10 @@ from strapdown._kernels import level
 from strapdown._kernels import wander as kernel
 from strapdown._kernels.level import LEVEL
 from strapdown._kernels.sample import wander_update
+from strapdown.constants import Array
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, Finding
-from strapdown.mechanization.mechanization import Array, Mechanization
+from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 
 # Nearer to a pole than this, m, a meter is more than 0.06 deg of heading.

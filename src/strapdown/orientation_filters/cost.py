@@ -13,8 +13,8 @@ import pandas as pd
 from strapdown import rotation
 from strapdown._kernels import arithmetic, orientation
 from strapdown.attitude_algorithms import Cost
-from strapdown.constants import CORTEX_M4F_CYCLES
-from strapdown.orientation_filters.filter import Array, OrientationEstimator
+from strapdown.constants import CORTEX_M4F_CYCLES, Array
+from strapdown.orientation_filters.filter import OrientationEstimator
 from strapdown.tables import ACCEL, GYRO, MAG
 
 #: Samples over which operations are averaged; whole blocks of every usual rate.

@@ -12,7 +12,8 @@ from strapdown import rotation
 from strapdown._kernels import orientation as kernel
 from strapdown.attitude_algorithms import Quaternion
 from strapdown.attitude_algorithms.algorithm import history_of_samples
-from strapdown.orientation_filters.filter import Array, FilterRun, OrientationEstimator
+from strapdown.constants import Array
+from strapdown.orientation_filters.filter import FilterRun, OrientationEstimator
 from strapdown.tables import ACCEL, GYRO
 
 #: Windows over which changes of velocity are looked at: of a slow body, and within it of one that

@@ -10,18 +10,17 @@ from typing import Any, ClassVar, NoReturn, Self
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown._kernels import orientation as kernel
 from strapdown._kernels.compilation import ARGUMENT_ERRORS
 from strapdown._kernels.increments import LARGEST
 from strapdown.attitude_algorithms.algorithm import refuse_sample
+from strapdown.constants import Array
 from strapdown.errors import ConfigError, DataError, DivergenceError
 from strapdown.tables import ACCEL, GYRO, MAG, check_sampling_kind
 from strapdown.tables.checks import values_of
-
-Array = NDArray[np.float64]
 
 _MISSING = np.full(3, np.nan)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.errors import ConfigError, Finding, check_choice
+from strapdown.errors import ConfigError, Finding, add_warning, check_choice
 from strapdown.peers import peer_ahrs, peer_imufusion, peer_vqf
 from strapdown.peers.peer import (
     AIDINGS,
@@ -122,13 +122,12 @@ def run_peers(
             label = peer.label(name)
             seconds = chosen.microseconds * 1e-6 * len(imu)
             if longest_s is not None and seconds > longest_s:
-                findings.append(
-                    Finding(
-                        "peers.left-out-samples-takes-about",
-                        quantity=f"{label}, {aiding}",
-                        count=len(imu),
-                        seconds=seconds,
-                    )
+                add_warning(
+                    findings,
+                    "peers.left-out-samples-takes-about",
+                    quantity=f"{label}, {aiding}",
+                    count=len(imu),
+                    seconds=seconds,
                 )
                 continue
             if progress is not None:

@@ -11,13 +11,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
+from strapdown.constants import Array
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding, check_choice
 from strapdown.tables import ACCEL, GYRO, MAG, attitude_table, check_imu
-
-Array = NDArray[np.float64]
 
 AIDINGS = ("gyro", "gyro+accel", "gyro+accel+mag")
 

@@ -23,7 +23,8 @@ from functools import partial
 import numpy as np
 
 from strapdown import rotation
-from strapdown.peers.peer import Array, Peer, PeerFilter, Samples, load
+from strapdown.constants import Array
+from strapdown.peers.peer import Peer, PeerFilter, Samples, load
 from strapdown.rotation import Q_NED_ENU
 
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from strapdown.constants import STANDARD_GRAVITY
-from strapdown.peers.peer import Array, Peer, PeerFilter, Samples, load
+from strapdown.constants import STANDARD_GRAVITY, Array
+from strapdown.peers.peer import Peer, PeerFilter, Samples, load
 
 
 def _run(samples: Samples, q_nb: Array, update: Callable[[Any, int], Any]) -> Array:

@@ -10,14 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from strapdown import rotation
-from strapdown.peers.peer import (
-    Array,
-    Peer,
-    PeerFilter,
-    Samples,
-    align_heading,
-    load,
-)
+from strapdown.constants import Array
+from strapdown.peers.peer import Peer, PeerFilter, Samples, align_heading, load
 from strapdown.rotation import Q_NED_ENU
 
 

@@ -12,9 +12,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.constants import Indices
 from strapdown.dsp.outliers import KEPT, REPLACED, Screened
 from strapdown.dsp.samples import check_segment, even_step
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
 from strapdown.tables import ACCEL, GYRO, MOTION, check_imu, check_motion_increments
 from strapdown.tables.checks import Array, index_of, source_of, values_of
 
@@ -217,7 +218,6 @@ def whole_factor(rate: float, grid: Grid, name: str) -> int:
 
 # Report of a prefilter: changed samples, and its effect on time, noise and frequencies.
 
-Indices = NDArray[np.int64]
 
 # Flagged samples with fewer samples between them belong to one event.
 APART = 32
@@ -355,7 +355,7 @@ def _bursts(
     changed: Changed, grid: Any, columns: Sequence[str], source: str | None
 ) -> list[Finding]:
     """Find events with more samples than are bridged, other than steps."""
-    found = []
+    found: list[Finding] = []
     for c, column in enumerate(columns):
         of = changed.channel == c
         number, flag = changed.number[of], changed.flag[of]
@@ -370,29 +370,20 @@ def _bursts(
                 continue
             told += 1
             a, b = int(number[event[0]]), int(number[event[-1]])
-            found.append(
-                Finding(
-                    "prefilter.outliers-too-close",
-                    file=source,
-                    row=a + 1,
-                    quantity=column,
-                    time=grid.time(a),
-                    time_2=grid.time(b),
-                    a=a + 1,
-                    b=b + 1,
-                    count=len(kept),
-                )
+            add_warning(
+                found,
+                "prefilter.outliers-too-close",
+                file=source,
+                row=a + 1,
+                quantity=column,
+                time=grid.time(a),
+                time_2=grid.time(b),
+                a=a + 1,
+                b=b + 1,
+                count=len(kept),
             )
         if left:
-            found.append(
-                Finding(
-                    "prefilter.more-bursts",
-                    file=source,
-                    quantity=column,
-                    severity="note",
-                    left=left,
-                )
-            )
+            add_note(found, "prefilter.more-bursts", file=source, quantity=column, left=left)
     return found
 
 

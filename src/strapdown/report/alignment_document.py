@@ -12,7 +12,7 @@ from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.fine import ROCKS
 from strapdown.alignment.readiness import STAY
-from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
+from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95, Array
 from strapdown.errors import Finding
 from strapdown.estimation.sensor_blocks import resting_sd
 from strapdown.navigation.record import innovation_labels
@@ -23,7 +23,6 @@ from strapdown.report.chart import (
     GREY,
     ORANGE,
     SKY,
-    Array,
     Chart,
     Fill,
     Level,

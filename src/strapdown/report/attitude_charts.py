@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.attitude_comparison.comparison import AttitudeComparison
+from strapdown.constants import Array
 from strapdown.evaluation.differences import error_angles
 from strapdown.report.attitude_words import (
     MEANINGS,
@@ -24,7 +25,6 @@ from strapdown.report.chart import (
     GREEN,
     GREY,
     VERMILLION,
-    Array,
     Band,
     Chart,
     Level,

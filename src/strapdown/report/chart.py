@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.constants import Array
 from strapdown.dsp.samples import true_runs
 from strapdown.tables.on_disk import let_go_of_all
-
-Array = NDArray[np.float64]
 
 # Colors of Okabe and Ito, distinguishable by color-blind readers.
 ORANGE, SKY, GREEN, BLUE = "#E69F00", "#56B4E9", "#009E73", "#0072B2"

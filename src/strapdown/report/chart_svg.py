@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from strapdown.constants import Array
 from strapdown.errors import ConfigError
 from strapdown.report.chart import (
-    Array,
     Band,
     Bars,
     Chart,

@@ -12,9 +12,10 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown import rotation
+from strapdown.constants import Array
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
-from strapdown.report.chart import BLUE, GREY, VERMILLION, Array
+from strapdown.report.chart import BLUE, GREY, VERMILLION
 from strapdown.report.crash_outline import Outline, path_moments
 from strapdown.report.document import Animation, Picture
 from strapdown.report.plan import hull

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95, Array
 from strapdown.crash.acceleration import Acceleration, window_weights
 from strapdown.crash.case import ReferenceAnswer
 from strapdown.crash.consistency import UnitComparison
@@ -28,7 +28,6 @@ from strapdown.report.chart import (
     GREEN,
     GREY,
     PURPLE,
-    Array,
     Band,
     Bars,
     Chart,

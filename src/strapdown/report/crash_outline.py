@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from strapdown.config.crash_case import VehicleSpec
+from strapdown.constants import Array
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof import AngleInterval
-from strapdown.report.chart import BLACK, Array, Mark, look
+from strapdown.report.chart import BLACK, Mark, look
 from strapdown.report.svg_drawing import Drawing
 from strapdown.report.values import plain
 

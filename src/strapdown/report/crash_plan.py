@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from strapdown.constants import Array
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import PLACE, CrashPath
-from strapdown.report.chart import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, Array
+from strapdown.report.chart import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 from strapdown.report.crash_outline import Outline, draw_outline, path_moments
 from strapdown.report.document import Picture
 from strapdown.report.plan import envelope

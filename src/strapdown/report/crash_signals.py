@@ -8,10 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95, Array, Flags
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath, PathComparison, PathSamples
 from strapdown.crash.reconstruction import UnitReconstruction
@@ -23,7 +22,6 @@ from strapdown.report.chart import (
     ORANGE,
     SKY,
     VERMILLION,
-    Array,
     Band,
     Chart,
     Fill,
@@ -206,7 +204,6 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
 
 # A triad as recorded: its curves in vehicle axes, and the limits of its range.
 
-Flags = NDArray[np.bool_]
 
 #: Buckets per curve; a report has many curves.
 BUCKETS = 700

@@ -13,22 +13,11 @@ import numpy as np
 
 from strapdown.bundle import write_json
 from strapdown.config.logs import DoctorSpec
-from strapdown.constants import MICRO_G
+from strapdown.constants import MICRO_G, Array
 from strapdown.errors import DataError, Finding, Words
 from strapdown.formats.clocks import UNIX, on_clock_of
 from strapdown.formats.recording import AXES_OF_SENSOR, PLACEHOLDERS
-from strapdown.report.chart import (
-    AXIS_COLOURS,
-    BLACK,
-    BLUE,
-    GREY,
-    Array,
-    Band,
-    Chart,
-    Line,
-    Panel,
-    curve,
-)
+from strapdown.report.chart import AXIS_COLOURS, BLACK, BLUE, GREY, Band, Chart, Line, Panel, curve
 from strapdown.report.document import (
     Block,
     Document,

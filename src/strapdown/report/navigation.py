@@ -14,6 +14,7 @@ import numpy as np
 
 from strapdown.bundle import input_files, write_json
 from strapdown.config.navigation import STAGES, NavigationSpec
+from strapdown.constants import Array
 from strapdown.errors import ConfigError
 from strapdown.formats import csv
 from strapdown.formats.clocks import clock_of
@@ -25,7 +26,6 @@ from strapdown.navigation.heading_integrity import REASONS, STATUSES
 from strapdown.navigation.integrity import QUANTITY_REASONS, Repeated
 from strapdown.navigation.record import NavigationRecord
 from strapdown.progress import Progress
-from strapdown.report.chart import Array
 from strapdown.report.navigation_document import (
     cautions,
     conventions,

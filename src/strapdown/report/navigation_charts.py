@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.constants import TWO_SIDED_95
+from strapdown.constants import TWO_SIDED_95, Array
 from strapdown.dsp.chi_square import chi_square_exceeded, normal_above
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.truth_comparison import bounds
@@ -23,7 +23,6 @@ from strapdown.report.chart import (
     PURPLE,
     SKY,
     VERMILLION,
-    Array,
     Band,
     Chart,
     Fill,

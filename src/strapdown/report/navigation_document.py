@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from strapdown.config.choice import ChoiceSpec
-from strapdown.constants import TWO_SIDED_95
+from strapdown.constants import TWO_SIDED_95, Array
 from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.truth_comparison import SmootherConsistency
-from strapdown.report.chart import AXIS_COLOURS, BLUE, GREY, Array, Chart, Panel, curve, thin_fill
+from strapdown.report.chart import AXIS_COLOURS, BLUE, GREY, Chart, Panel, curve, thin_fill
 from strapdown.report.chart import BUCKETS_OVER_TIME as BUCKETS
 from strapdown.report.document import (
     Block,

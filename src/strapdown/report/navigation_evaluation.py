@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.config.navigation import make_aids
+from strapdown.constants import Array
 from strapdown.dsp.chi_square import chi_square_exceeded, plane_bound
 from strapdown.dsp.samples import true_runs
 from strapdown.errors import Finding
@@ -30,7 +31,6 @@ from strapdown.navigation.truth_comparison import (
     compare_with_truth,
     smoother_consistency,
 )
-from strapdown.report.chart import Array
 from strapdown.report.document import Trust, reason
 from strapdown.report.values import shown_unit
 from strapdown.systems.navigation_run import NavigationRun

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.constants import Array
 from strapdown.dsp.samples import running_integral, true_runs
 from strapdown.ellipsoids import WGS84
 from strapdown.formats.trajectory_writers import thin
@@ -21,7 +22,6 @@ from strapdown.report.chart import (
     GREY,
     PURPLE,
     VERMILLION,
-    Array,
     Backdrop,
     Chart,
     Line,

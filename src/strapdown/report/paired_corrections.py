@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from strapdown.constants import Array
 from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.formats import csv
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import NavigationRecord
-from strapdown.report.chart import BLUE, VERMILLION, Array, Chart, Panel, curve
+from strapdown.report.chart import BLUE, VERMILLION, Chart, Panel, curve
 from strapdown.report.chart import BUCKETS_OVER_TIME as BUCKETS
 from strapdown.report.document import TableBlock, table_of
 from strapdown.report.navigation_evaluation import rms

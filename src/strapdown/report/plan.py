@@ -10,8 +10,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
+from strapdown.constants import Array
 from strapdown.dsp.chi_square import PLANE_95
-from strapdown.report.chart import BLACK, GREEN, VERMILLION, Array, Line, dots
+from strapdown.report.chart import BLACK, GREEN, VERMILLION, Line, dots
 from strapdown.report.svg_drawing import overlap
 
 Path = tuple[Array, Array]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from strapdown.report.chart import Array
+from strapdown.constants import Array
 
 _DIGITS = 4  # a tenth of a millimeter
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import pandas as pd
 
-from strapdown.bundle import InputFiles, Seal, sensor_file, write_json
+from strapdown.bundle import InputFiles, sensor_file, write_json
 from strapdown.config.outage import OutageSpec, SensorsSpec
 from strapdown.config.spec import specify
 from strapdown.constants import STANDARD_GRAVITY
@@ -105,6 +105,8 @@ class SensorsRun(SavedRun):
         Sensors without a triad, which have no drift.
     """
 
+    bundle = "strapdown.report.sensors:SENSORS_BUNDLE"
+
     spec: SensorsSpec
     sensors: tuple[Sensor, ...]
     deviations: pd.DataFrame
@@ -130,10 +132,6 @@ class SensorsRun(SavedRun):
         if chart is None:
             raise ConfigError(self.findings[0])
         return ChartFigure(chart)
-
-    @staticmethod
-    def _writer() -> Callable[..., Seal]:
-        return SENSORS_BUNDLE.write
 
     def __repr__(self) -> str:
         return f"<SensorsRun {', '.join(one.name for one in self.sensors)}>"

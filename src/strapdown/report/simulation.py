@@ -13,6 +13,7 @@ from strapdown.attitude_comparison.source import scenario_errors, simulate_scena
 from strapdown.bundle import Seal, check_destination, sensor_file, write_bundle, write_json
 from strapdown.config.motions import TrajectorySpec
 from strapdown.config.sources import SimulateSpec
+from strapdown.constants import Array
 from strapdown.ellipsoids import WGS84, Ellipsoid, find_ellipsoid
 from strapdown.errors import check_choice
 from strapdown.formats.trajectory_writers import one_line, thin
@@ -24,7 +25,7 @@ from strapdown.formats.writers import (
     write_attitude_csv,
 )
 from strapdown.frames import ned_from_geodetic
-from strapdown.report.chart import BLUE, ORANGE, Array, Chart, Line, Panel, break_jumps, curve
+from strapdown.report.chart import BLUE, ORANGE, Chart, Line, Panel, break_jumps, curve
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.crash_simulation import stated_errors
 from strapdown.report.plan import PlanView, path_marks

@@ -12,7 +12,7 @@ from html import escape
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown.report.chart import Array
+from strapdown.constants import Array
 
 Box = tuple[float, float, float, float]
 

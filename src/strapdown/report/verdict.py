@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from strapdown.constants import TWO_SIDED_95
+from strapdown.constants import TWO_SIDED_95, Array
 from strapdown.dsp.chi_square import plane_bound
 from strapdown.navigation.heading_checks import UNSEEN
 from strapdown.navigation.heading_integrity import (
@@ -29,7 +29,6 @@ from strapdown.report.chart import (
     BLUE,
     GREY,
     VERMILLION,
-    Array,
     Chart,
     Level,
     Line,

@@ -28,7 +28,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.errors import DataError, Finding, StrapdownError
 from strapdown.sensors.calibration_model import (
@@ -348,40 +347,6 @@ def _with(C: Array, rows: Sequence[tuple[Array, float]], sd: Array) -> Array:
         gain = C @ h
         C = C - np.outer(gain, gain) / (float(h @ gain) + noise**2)
     return C
-
-
-def in_accel_axes(errors: ImuErrors) -> ImuErrors:
-    """Errors in axes in which the misalignment of the accelerometers is symmetric.
-
-    The readings are the same: a rotation of the body axes is moved from one matrix to the other.
-    """
-    accel = errors.accel or TriadErrors()
-    A = np.eye(3) + np.asarray(accel.misalignment)
-    G = np.eye(3) + np.asarray(errors.gyro.misalignment)
-    scale_a, scale_g = (
-        1.0 + np.array(accel.axis("scale")),
-        1.0 + np.array(errors.gyro.axis("scale")),
-    )
-    K, W = scale_a[:, None] * A, scale_g[:, None] * G
-    S = np.asarray(errors.gyro.g_sensitivity) * scale_g[:, None]
-    for _ in range(20):
-        own = K / np.diag(K)[:, None]
-        skew = 0.5 * (own - own.T)
-        turn = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
-        R = rotation.dcm_from_rotation_vector(-turn)
-        K, W, S = K @ R, W @ R, S @ R
-        if np.abs(turn).max() < 1e-15:
-            break
-    parts: list[dict[str, Any]] = []
-    for matrix in (K, W):
-        scale = np.diag(matrix)
-        own = matrix / scale[:, None]
-        np.fill_diagonal(own, 0.0)
-        parts.append({"scale": triad_of(scale - 1.0), "misalignment": matrix_of(own)})
-    sensitivity = matrix_of(S / np.diag(W)[:, None])
-    return ImuErrors(
-        replace(errors.gyro, g_sensitivity=sensitivity, **parts[1]), replace(accel, **parts[0])
-    )
 
 
 # The file of a calibration.

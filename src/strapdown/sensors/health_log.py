@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from strapdown.constants import Flags, Indices
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.rest import MAX_ACCEL_SD, MAX_GYRO_SD, QUIET_FACTOR, QUIET_QUANTILE, ROUNDING
 from strapdown.sensors.uncertainty import ImuUncertainty
@@ -24,8 +25,6 @@ from strapdown.tables.checks import (
     view_of,
 )
 from strapdown.tables.on_disk import let_go, parts_of, room
-
-Mask = NDArray[np.bool_]
 
 # Long enough for a standard deviation and a mean, short enough to locate a fault.
 BLOCK = 1.0  # s
@@ -80,7 +79,7 @@ class Blocks:
     sd: Array
     noise: Array
     white: Array
-    valid: Mask
+    valid: Flags
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +95,7 @@ class HealthLog:
     time: Array
     names: tuple[str, ...]
     values: Array
-    wrong: Mask
+    wrong: Flags
     sensors: ImuUncertainty | None
     gravity: tuple[float, float]
     false_alarm: float
@@ -123,7 +122,7 @@ class HealthLog:
         triad = self.sensors.gyro if name in GYRO else self.sensors.accel
         return triad.axis(attribute)["xyz".index(name[-1])]
 
-    def quiet(self) -> Mask:
+    def quiet(self) -> Flags:
         """Blocks in which each channel is as quiet as in its quietest, (blocks, channels).
 
         Blocks in which a channel is not valid count as quiet.
@@ -142,7 +141,7 @@ class HealthLog:
             out[own, k] = b.sd[own, k] <= limit
         return out
 
-    def rests(self, channel: int | None = None) -> Mask:
+    def rests(self, channel: int | None = None) -> Flags:
         """Stationary blocks according to all channels, or to all but one, (blocks,)."""
         others = [k for k in range(len(self.names)) if k != channel]
         quiet, valid = self.quiet()[:, others], self.blocks.valid[:, others]
@@ -217,7 +216,7 @@ def health_log(
     return HealthLog(source, time, tuple(names), values, wrong, sensors, gravity, false_alarm)
 
 
-def intervals_of(flags: Mask, join: int = 0) -> list[tuple[int, int]]:
+def intervals_of(flags: Flags, join: int = 0) -> list[tuple[int, int]]:
     """First and last index of each run of true; gaps of at most `join` false are bridged."""
     edges = np.diff(np.r_[False, flags, False].astype(np.int8))
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
@@ -291,8 +290,6 @@ def tail_limit(
 
 
 # Runs of repeated values, and their lengths without a fault.
-
-Indices = NDArray[np.int64]
 
 
 def equal_runs(v: Array) -> tuple[Indices, Indices, int]:

@@ -12,14 +12,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.constants import MAD_TO_SD
+from strapdown.constants import MAD_TO_SD, Flags
 from strapdown.earth import gravity as normal_gravity
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError, Finding
 from strapdown.sensors.health_log import (
     ChannelFault,
     HealthLog,
-    Mask,
     equal_runs,
     health_log,
     intervals_of,
@@ -268,13 +267,13 @@ def find_noisy(log: HealthLog) -> list[ChannelFault]:
 def _throughout(
     log: HealthLog,
     k: int,
-    rest: Mask,
+    rest: Flags,
     fellows: list[int],
     stated: float,
     limit: Array,
     reason: NDArray[np.int64],
     sizes: Array,
-) -> Mask:
+) -> Flags:
     """Test all stationary blocks together, with a margin that decreases with their number."""
     out = np.zeros_like(rest)
     count = int(rest.sum())
@@ -341,7 +340,7 @@ def _second(log: HealthLog, k: int, blocks: NDArray[np.int64]) -> Array:
     return np.abs(np.diff(cut, 2, axis=1))
 
 
-def _struck(second: Array, base: float) -> Mask:
+def _struck(second: Array, base: float) -> Flags:
     """Blocks with a few outliers among otherwise unchanged samples."""
     if not base > 0.0:
         return np.zeros(len(second), dtype=bool)
@@ -364,7 +363,7 @@ def _fault(
     k: int,
     kind: str,
     blocks: tuple[int, int],
-    flags: Mask,
+    flags: Flags,
     sizes: Array,
     limits: Array,
     reasons: NDArray[np.int64],
@@ -590,7 +589,7 @@ def _least(log: HealthLog, k: int, count: int) -> float:
     return max(chance * math.hypot(white, _quantum(log, k) / math.sqrt(12.0)), _drift(log, k))
 
 
-def _usual(size: Array, still: Mask, at: int, false_alarm: float) -> float:
+def _usual(size: Array, still: Flags, at: int, false_alarm: float) -> float:
     """Limit from the changes elsewhere in the record."""
     elsewhere = still.copy()
     elsewhere[max(at - 2 * SIDE, 0) : at + 2 * SIDE + 1] = False

@@ -9,16 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.constants import STANDARD_GRAVITY, Flags
+from strapdown.errors import ConfigError, DataError, Finding, add_warning
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.pre_crash import BiasEstimate
 from strapdown.sensors.rest import sd_of_mean
 from strapdown.sensors.saturation import RangeLimits
 from strapdown.sensors.triad_errors import ZERO, Triad, triad_of
 from strapdown.tables.checks import Array, check_rows, check_time
-
-Mask = NDArray[np.bool_]
 
 # After saturation the filter before the sampler still contains the clipped part: e⁻⁵ = 0.7 % after
 # five of its time constants.
@@ -56,7 +54,7 @@ class MergedRanges:
     values: Array
     noise: Array
     spoken: NDArray[np.int8]
-    clipped: Mask
+    clipped: Flags
     step: Array
     step_sd: Array
     switches: NDArray[np.int64]
@@ -113,7 +111,7 @@ def merge_ranges(
     return MergedRanges(out, sd, spoken, clipped, step, step_sd, switches)
 
 
-def _clear(time: Array, one: Range, k: int, margin: float, hysteresis: float) -> Mask:
+def _clear(time: Array, one: Range, k: int, margin: float, hysteresis: float) -> Flags:
     """Where an axis is clear of its end, with hysteresis, neighbors and the filter's memory."""
     y, limits = one.values[:, k], one.limits
     low, high = float(limits.lower[k]), float(limits.upper[k])
@@ -141,7 +139,7 @@ def _clear(time: Array, one: Range, k: int, margin: float, hysteresis: float) ->
     return np.asarray(~away, dtype=np.bool_)
 
 
-def _weight(time: Array, clear: Mask, fade: float) -> Array:
+def _weight(time: Array, clear: Flags, fade: float) -> Array:
     """Weight of the lower range: one where it is clear, decreasing toward a switch-over."""
     if fade <= 0.0 or clear.all() or not clear.any():
         return clear.astype(np.float64)
@@ -152,7 +150,7 @@ def _weight(time: Array, clear: Mask, fade: float) -> Array:
     return np.where(clear, np.clip(np.minimum(before, after) / fade, 0.0, 1.0), 0.0)
 
 
-def _step(clear: Mask, difference: Array, variance: Array) -> tuple[float, float, int]:
+def _step(clear: Flags, difference: Array, variance: Array) -> tuple[float, float, int]:
     """Weighted mean difference at the switch-overs, its sd, and their number."""
     change = np.diff(clear.astype(np.int8))
     rows = np.r_[np.flatnonzero(change == -1), np.flatnonzero(change == 1) + 1]
@@ -246,14 +244,13 @@ def agreement_findings(unit: CrashUnit, ranges: Sequence[Range]) -> list[Finding
         clear = np.asarray(~(below.limits.clipped | above.limits.clipped).any(axis=1))
         clear[1:-1] &= clear[:-2] & clear[2:]
         if int(clear.sum()) < LEAST_SAMPLES:
-            found.append(
-                Finding(
-                    "sensors.samples-both-clear-their-ends",
-                    file=source,
-                    quantity="accel",
-                    clear=int(clear.sum()),
-                    name=low.name,
-                )
+            add_warning(
+                found,
+                "sensors.samples-both-clear-their-ends",
+                file=source,
+                quantity="accel",
+                clear=int(clear.sum()),
+                name=low.name,
             )
             continue
         upper, lower = above.values[clear], below.values[clear]
@@ -278,17 +275,16 @@ def agreement_findings(unit: CrashUnit, ranges: Sequence[Range]) -> list[Finding
                 code = "sensors.range-follows-other-axis"
             else:
                 code, column = "sensors.range-does-not-follow", row
-            found.append(
-                Finding(
-                    code,
-                    file=source,
-                    quantity=f"accel_{axis}",
-                    name=low.name,
-                    axis="xyz"[column],
-                    sign=sign,
-                    ratio=matrix[row, column],
-                    sd=sd[row, column],
-                )
+            add_warning(
+                found,
+                code,
+                file=source,
+                quantity=f"accel_{axis}",
+                name=low.name,
+                axis="xyz"[column],
+                sign=sign,
+                ratio=matrix[row, column],
+                sd=sd[row, column],
             )
     return found
 
@@ -311,7 +307,7 @@ def bias_from_lower_range(
     time: Array,
     higher: Array,
     lower: Array,
-    use: Mask,
+    use: Flags,
     *,
     quantization: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> BiasEstimate | None:

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.constants import Flags
 from strapdown.dsp.chi_square import chi_square_exceeded
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.crash_unit import SAME_STAMP
@@ -26,8 +27,6 @@ from strapdown.tables.checks import (
     source_of,
     values_of,
 )
-
-Mask = NDArray[np.bool_]
 
 # Parity of redundant axes: their consistency, independent of the motion.
 
@@ -212,7 +211,7 @@ class AxisVote:
     """
 
     values: Array
-    used: Mask
+    used: Flags
     events: tuple[AxisEvent, ...]
 
 
@@ -283,7 +282,7 @@ class AxisVoting:
         """Weights of the axes: inverse variances of 1 s means, with bias and drift."""
         return np.asarray(1.0 / self._one_second())
 
-    def covariance(self, used: Mask, variance: Array) -> Array:
+    def covariance(self, used: Flags, variance: Array) -> Array:
         """Covariance of the vector, (3, 3), for independent axis variances, (m,)."""
         h = np.asarray(self.directions)
         w = self.weights * used
@@ -747,7 +746,7 @@ def _words(channel: str) -> str:
 # Uncertainty of the vector fused from redundant axes.
 
 
-def fused_noise(voting: AxisVoting, used: Mask) -> Array:
+def fused_noise(voting: AxisVoting, used: Flags) -> Array:
     """Noise density of the fused vector at each sample.
 
     `used` ((n, m)): axes included in the vector. Returns (n, 3), u/√Hz.

@@ -12,15 +12,13 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels.sums import window_moments
+from strapdown.constants import Indices, Triple
 from strapdown.dsp.samples import occupied_grid
 from strapdown.errors import DataError
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import ACCEL, GYRO, MAG
 from strapdown.tables.checks import Array, view_of
 from strapdown.tables.on_disk import let_go
-
-Triple = tuple[float, float, float]
-Indices = NDArray[np.int64]
 
 # Window length: long enough for a meaningful standard deviation, short enough to detect a pause of
 # a second.

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import Finding
+from strapdown.errors import Finding, add_warning
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import Array, index_of, source_of, values_of
 
@@ -135,7 +135,7 @@ def held_starts(values: Array) -> NDArray[np.int64] | None:
 
 def _held(imu: pd.DataFrame) -> list[Finding]:
     """Find triads whose samples are repeated until the sensor has a new one."""
-    out = []
+    out: list[Finding] = []
     rate = (len(imu) - 1) / float(imu.index[-1] - imu.index[0])
     for triad, columns in (("gyro", GYRO), ("accel", ACCEL)):
         if columns[0] not in imu.columns:
@@ -144,16 +144,15 @@ def _held(imu: pd.DataFrame) -> list[Finding]:
         starts = held_starts(values)
         if starts is not None:
             length = len(values) / starts.size
-            out.append(
-                Finding(
-                    "sensors.samples-held",
-                    file=source_of(imu),
-                    quantity=triad,
-                    triad=triad,
-                    length=length,
-                    rate_hz=rate,
-                    own_rate_hz=rate / length,
-                )
+            add_warning(
+                out,
+                "sensors.samples-held",
+                file=source_of(imu),
+                quantity=triad,
+                triad=triad,
+                length=length,
+                rate_hz=rate,
+                own_rate_hz=rate / length,
             )
     return out
 
@@ -180,7 +179,7 @@ def _coarse(imu: pd.DataFrame, channels: Sequence[str]) -> list[Finding]:
     # The quantization of increments is that of a sum, which loses nothing.
     if imu.attrs.get("sampling") == "mean":
         return []
-    out = []
+    out: list[Finding] = []
     block = max(round((len(imu) - 1) / float(imu.index[-1] - imu.index[0])), LEAST_STEPS)
     for triad, columns in (("gyro", GYRO), ("accel", ACCEL)):
         coarse: dict[str, tuple[float, float]] = {}
@@ -193,15 +192,14 @@ def _coarse(imu: pd.DataFrame, channels: Sequence[str]) -> list[Finding]:
                 coarse[name] = step, noise
         if coarse:
             step, noise = max(coarse.values())
-            out.append(
-                Finding(
-                    "sensors.quantization-coarse",
-                    file=source_of(imu),
-                    quantity=", ".join(coarse),
-                    step=step,
-                    noise=noise,
-                    unit="rad/s" if triad == "gyro" else "m/s²",
-                )
+            add_warning(
+                out,
+                "sensors.quantization-coarse",
+                file=source_of(imu),
+                quantity=", ".join(coarse),
+                step=step,
+                noise=noise,
+                unit="rad/s" if triad == "gyro" else "m/s²",
             )
     return out
 

@@ -6,12 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from strapdown.constants import Flags
 from strapdown.tables.checks import Array
-
-Mask = NDArray[np.bool_]
-
 
 # A crash saturates a sensor for tens of milliseconds; a longer flat stretch is a rest.
 LONGEST_FLAT = 0.5  # s
@@ -43,9 +40,9 @@ class RangeLimits:
 
     lower: Array
     upper: Array
-    clipped: Mask
-    found: Mask
-    beyond: Mask
+    clipped: Flags
+    found: Flags
+    beyond: Flags
 
 
 def find_limits(
@@ -53,7 +50,7 @@ def find_limits(
     values: Array,
     full_scale: Array,
     quantization: Array,
-    held: Mask | None = None,
+    held: Flags | None = None,
     *,
     longest_flat: float = LONGEST_FLAT,
 ) -> RangeLimits:
@@ -98,7 +95,7 @@ def find_limits(
     return RangeLimits(lower, upper, clipped, found, beyond)
 
 
-def _flat_extreme(time: Array, y: Array, sign: float, full: float, longest: float) -> Mask | None:
+def _flat_extreme(time: Array, y: Array, sign: float, full: float, longest: float) -> Flags | None:
     """Samples at the largest or smallest value, if it appears to be an end of the range."""
     if y.size < LEAST_FLAT:
         return None

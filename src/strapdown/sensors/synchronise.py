@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, add_warning
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.error_chain import time_constant
 from strapdown.sensors.triad_channels import TriadChannels, triad_channels
@@ -374,27 +374,26 @@ WORTH_A_WORD = 0.1  # s
 
 def end_findings(unit: str, parts: Sequence[TriadAtStamps]) -> list[Finding]:
     """Report samples near the ends of a record, where the low-pass extrapolated it."""
-    found = []
+    found: list[Finding] = []
     for t in parts:
         if t.whole.all():
             continue
         inner, time = np.flatnonzero(t.whole), t.triad.table.index.to_numpy()
-        found.append(
-            Finding(
-                "sensors.low-pass-at-ends" if inner.size else "sensors.low-pass-nowhere-whole",
-                file=f"{unit}, {t.triad.name}",
-                quantity="time",
-                begin=time[inner[0]] if inner.size else None,
-                end=time[inner[-1]] if inner.size else None,
-                noise_factor=float(t.noise_factor.max() / np.median(t.noise_factor)),
-            )
+        add_warning(
+            found,
+            "sensors.low-pass-at-ends" if inner.size else "sensors.low-pass-nowhere-whole",
+            file=f"{unit}, {t.triad.name}",
+            quantity="time",
+            begin=time[inner[0]] if inner.size else None,
+            end=time[inner[-1]] if inner.size else None,
+            noise_factor=float(t.noise_factor.max() / np.median(t.noise_factor)),
         )
     return found
 
 
 def clipped_findings(unit: str, parts: Sequence[TriadAtStamps]) -> list[Finding]:
     """Report saturated samples where the low-pass hides them from later processing."""
-    found = []
+    found: list[Finding] = []
     for t in parts:
         if t.method not in HIDING:
             continue
@@ -403,15 +402,14 @@ def clipped_findings(unit: str, parts: Sequence[TriadAtStamps]) -> list[Finding]
         for k, axis in enumerate("xyz"):
             rows = np.flatnonzero(t.clipped[:, k])
             if rows.size:
-                found.append(
-                    Finding(
-                        f"sensors.{kind}-clipped-before-resampling",
-                        file=f"{unit}, {t.triad.name}",
-                        quantity=f"{kind}_{axis}",
-                        size=rows.size,
-                        time=time[rows[0]],
-                        time_2=time[rows[-1]],
-                    )
+                add_warning(
+                    found,
+                    f"sensors.{kind}-clipped-before-resampling",
+                    file=f"{unit}, {t.triad.name}",
+                    quantity=f"{kind}_{axis}",
+                    size=rows.size,
+                    time=time[rows[0]],
+                    time_2=time[rows[-1]],
                 )
     return found
 
@@ -423,28 +421,26 @@ def cut_findings(spans: Sequence[tuple[str, float, float]], time: Array) -> list
     """
     latest, earliest = max(spans, key=lambda s: s[1]), min(spans, key=lambda s: s[2])
     first, last = min(spans, key=lambda s: s[1]), max(spans, key=lambda s: s[2])
-    found = []
+    found: list[Finding] = []
     if time[0] - first[1] > WORTH_A_WORD:
-        found.append(
-            Finding(
-                "sensors.begins-last-before-not-used",
-                file=latest[0],
-                quantity="time",
-                latest=latest[1],
-                first=first[0],
-                first_2=first[1],
-            )
+        add_warning(
+            found,
+            "sensors.begins-last-before-not-used",
+            file=latest[0],
+            quantity="time",
+            latest=latest[1],
+            first=first[0],
+            first_2=first[1],
         )
     if last[2] - time[-1] > WORTH_A_WORD:
-        found.append(
-            Finding(
-                "sensors.ends-first-after-not-used",
-                file=earliest[0],
-                quantity="time",
-                earliest=earliest[2],
-                last=last[0],
-                last_2=last[2],
-            )
+        add_warning(
+            found,
+            "sensors.ends-first-after-not-used",
+            file=earliest[0],
+            quantity="time",
+            earliest=earliest[2],
+            last=last[0],
+            last_2=last[2],
         )
     return found
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_warning
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.tables import ACCEL, GYRO, check_table_sampling, find_gaps
 from strapdown.tables.checks import Array, check_rows, check_time
@@ -222,20 +222,21 @@ def _judge_force(
             raise DataError(
                 "sensors.specific-force-in-g", file=source, quantity="accel", length=length
             )
-        found.append(
-            Finding(
-                "sensors.specific-force-in-g-or-bias", file=source, quantity="accel", length=length
-            )
+        add_warning(
+            found,
+            "sensors.specific-force-in-g-or-bias",
+            file=source,
+            quantity="accel",
+            length=length,
         )
     elif length < NO_GRAVITY and max(triad.uncertainty.axis("bias")) < STANDARD_GRAVITY:
         # Of channels that were zeroed, gravity is in the bias, if that is stated so large.
-        found.append(
-            Finding(
-                "sensors.specific-force-before-crash-length",
-                file=source,
-                quantity="accel",
-                length=length,
-            )
+        add_warning(
+            found,
+            "sensors.specific-force-before-crash-length",
+            file=source,
+            quantity="accel",
+            length=length,
         )
     return found
 

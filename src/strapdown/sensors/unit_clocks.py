@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from strapdown.constants import Flags
 from strapdown.dsp.decimation import (
     Resampled,
     decimate,
@@ -20,7 +20,7 @@ from strapdown.dsp.decimation import (
 )
 from strapdown.dsp.delay import Delay, EvenSignal, find_delay
 from strapdown.dsp.samples import even_step
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, add_warning
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.error_chain import time_constant
 from strapdown.sensors.saturation import RangeLimits, find_limits
@@ -94,7 +94,7 @@ def clocks_by_correlation(
     unit has no trigger, a unit has too little overlap with it, or the motion is periodic.
     """
     zero = _trigger(reference.unit)
-    clocks, findings = [], []
+    clocks, findings = [], list[Finding]()
     for u in units:
         if u is reference:
             clocks.append(UnitClock(zero, 0.0, "reference"))
@@ -111,15 +111,14 @@ def clocks_by_correlation(
         off = u.unit.trigger - clock.offset
         sd = math.hypot(clock.sd, math.hypot(u.unit.trigger_sd, reference.unit.trigger_sd))
         if abs(off) > CONTRADICTION * sd:
-            findings.append(
-                Finding(
-                    "sensors.trigger-lies-ms-put-standard",
-                    file=u.unit.name,
-                    quantity="trigger",
-                    off=1000.0 * off,
-                    what=what,
-                    sd=1000.0 * sd,
-                )
+            add_warning(
+                findings,
+                "sensors.trigger-lies-ms-put-standard",
+                file=u.unit.name,
+                quantity="trigger",
+                off=1000.0 * off,
+                what=what,
+                sd=1000.0 * sd,
             )
     return clocks, findings
 
@@ -191,7 +190,6 @@ def _length(channels: TriadChannels) -> EvenSignal:
 
 # Resampling of a triad to common stamps: faster ones without aliasing, slower ones interpolated.
 
-Flags = NDArray[np.bool_]
 
 # Stamps that agree to within this fraction of a step are equal.
 SAME_STAMP = 1e-3
@@ -273,7 +271,7 @@ def onto_stamps(
     limits = np.array(triad.uncertainty.axis("full_scale"))
     steps = np.array(triad.uncertainty.axis("quantization"))
     density = np.array(triad.uncertainty.axis("noise_density"))
-    methods, findings = [], []
+    methods, findings = [], list[Finding]()
     for g in channels.groups:
         axes = list(g.axes)
         # An axis that reads beyond its stated range has another end and is not clipped at the
@@ -293,16 +291,15 @@ def onto_stamps(
         own = 1.0 / g.step
         # Interpolation at a similar rate loses no information worth reporting.
         if method == "interpolated" and own * SAME_RATE <= rate:
-            findings.append(
-                Finding(
-                    "sensors.hz-slower-than-common-stamps",
-                    file=channels.source,
-                    quantity="time",
-                    names=[columns[a] for a in axes],
-                    own=own,
-                    rate=rate,
-                    own_2=own / 8.0,
-                )
+            add_warning(
+                findings,
+                "sensors.hz-slower-than-common-stamps",
+                file=channels.source,
+                quantity="time",
+                names=[columns[a] for a in axes],
+                own=own,
+                rate=rate,
+                own_2=own / 8.0,
             )
     table = pd.DataFrame(values, index=pd.Index(stamps, name="time"), columns=columns)
     table.attrs = {**triad.table.attrs, "sampling": sampling, "source": channels.source}

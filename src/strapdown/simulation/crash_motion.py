@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown.constants import STANDARD_GRAVITY, Triple
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError, check_choice
 from strapdown.simulation.earth_motion import (
@@ -29,8 +29,6 @@ from strapdown.simulation.motion import (
     euler_body_rate,
 )
 from strapdown.tables.checks import Array
-
-Triple = tuple[float, float, float]
 
 _ZERO: Triple = (0.0, 0.0, 0.0)
 # Tolerance for a pulse that ends with the motion, whose sum of times may round past the end.

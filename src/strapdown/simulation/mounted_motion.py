@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown import earth, frames, rotation
+from strapdown.constants import Triple
 from strapdown.errors import ConfigError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.simulation.crash_motion import CrashMotion
@@ -340,8 +341,6 @@ def _lever(arm: Arm, rate: Array, swing: Array) -> Array:
 def _turned_twice(rate: Array, r: Array) -> Array:
     return np.asarray(np.cross(rate, np.cross(rate, r)))
 
-
-Triple = tuple[float, float, float]
 
 # (1 - e)^2 of the onset, expanded in powers.
 _BINOMIAL = (1.0, -2.0, 1.0)

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from strapdown.constants import Triple
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import (
@@ -384,7 +385,6 @@ def along_velocity(velocity: Array, acceleration: Array) -> tuple[Array, Array]:
     return np.degrees(angles).T, np.degrees(rates).T
 
 
-Triple = tuple[float, float, float]
 # Shortest period as a fraction of the duration: limits the integral to a few hundred megabytes.
 _LEAST_PERIOD = 1e-5
 

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool
 
+from strapdown.config import toml_text
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.config.crash_case import CaseSpec
 from strapdown.config.logs import AxesTable, FixesTable, LogTable, flags_of
@@ -31,7 +32,7 @@ from strapdown.config.spec import (
     accepted_by,
     specify,
 )
-from strapdown.config.toml_text import Asked, Offered, Page, inline, string
+from strapdown.config.toml_text import Page, inline, string
 from strapdown.errors import DataError, Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.sensors.bridge import target_of
@@ -48,21 +49,14 @@ from strapdown.studio.questions import (
 
 
 @dataclass(frozen=True)
-class Draft:
-    """A proposed configuration: its text, what it rests on, and what is open.
+class Draft(toml_text.Draft):
+    """A proposed configuration in the studio.
 
-    `choose`: questions about the files, without whose answers it has no text. `offers`: tables
-    that a person may add; `again`: questions whose answers are proposed anew.
+    `choose`: questions about the files, without whose answers it has no text; `again`: questions
+    whose answers are proposed anew.
     """
 
-    text: str
-    found: tuple[str, ...] = ()
-    asked: tuple[Asked, ...] = ()
-    to_check: tuple[Asked, ...] = ()
-    findings: tuple[Finding, ...] = ()
-    name: str = ""
     choose: tuple[dict[str, Any], ...] = ()
-    offers: tuple[Offered, ...] = ()
     again: tuple[dict[str, Any], ...] = ()
 
 
@@ -292,11 +286,7 @@ def _draft_crash(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
         stated[record.path] = StatedReading(axes=own_axes or "", **taken)
         if left := [k for k in of_each(own)[0] if k not in taken and k not in PART]:
             name = record.path.as_posix()
-            beside.append(
-                Finding(
-                    "studio.reading-not-used", severity="warning", file=name, data={"keys": left}
-                )
-            )
+            beside.append(Finding("studio.reading-not-used", file=name, data={"keys": left}))
     begin, end = keys.get("from_s"), keys.get("to_s")
     part: tuple[Finding, ...] = ()
     if begin is not None or end is not None:
@@ -304,7 +294,7 @@ def _draft_crash(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
         part = (Finding("studio.part-not-used", data=data),)
     more = (*beside, *unused, *part)
     return [
-        Draft(one.text, one.found, one.asked, one.to_check, (*one.findings, *more), one.vehicle)
+        Draft(**{**vars(one), "findings": (*one.findings, *more), "name": one.vehicle})
         for one in draft_cases(records, folder=Path(), stated=stated)
     ]
 
@@ -466,7 +456,6 @@ def _draft_of_options(table: str, what: str, example: Iterable[tuple[str, str, s
         findings = [
             Finding(
                 "studio.read-as-the-first",
-                severity="warning",
                 file=one.as_posix(),
                 data={"first": first.as_posix()},
             )
@@ -522,21 +511,11 @@ def _flags(values: Mapping[str, Any]) -> list[str]:
 
 def _attitude_words(spec: Any, _: str) -> tuple[list[str], str]:
     own, usual = spec.attitude, AttitudeTable()
-    stated = {
-        "--tolerance-deg": own.tolerance_deg,
-        "--interpolation": own.interpolation,
-        "--initial": own.initial,
-        "--gyro-bias": own.gyro_bias,
-        "--magnetometer": own.magnetometer,
+    flags: dict[str, Any] = {
+        f"--{key.replace('_', '-')}": getattr(own, key)
+        for key in ("tolerance_deg", "interpolation", "initial", "gyro_bias", "magnetometer")
+        if getattr(own, key) != getattr(usual, key)
     }
-    defaults = {
-        "--tolerance-deg": usual.tolerance_deg,
-        "--interpolation": usual.interpolation,
-        "--initial": usual.initial,
-        "--gyro-bias": usual.gyro_bias,
-        "--magnetometer": usual.magnetometer,
-    }
-    flags = {flag: value for flag, value in stated.items() if value != defaults[flag]}
     flags |= {
         "--algorithms": " ".join(own.algorithms),
         "--rates": " ".join(f"{rate:g}" for rate in own.rates_hz),

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from strapdown.constants import Array
 
 FACTOR = 16
 #: List of what a stream has.

@@ -34,12 +34,13 @@ from strapdown.bundle import (
     resolved,
     sha256,
 )
+from strapdown.constants import Array
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.navigation.heading_integrity import STATUSES
 from strapdown.studio.folder import Folder, repeating
 from strapdown.studio.kinds import KINDS
 from strapdown.studio.look import kept_stream
-from strapdown.studio.pyramid import LIST, Array
+from strapdown.studio.pyramid import LIST
 from strapdown.tables.checks import find_gaps, index_of
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass
+from dataclasses import MISSING
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,7 @@ import pandas as pd
 from strapdown.config.alignment import STAGES
 from strapdown.config.choice import SLOTS, Kinds, Slot, options_of
 from strapdown.config.logs import AxesTable, LogTable
-from strapdown.config.toml_text import ASK, Asked, Offered, Page, inline, string
-from strapdown.errors import Finding
+from strapdown.config.toml_text import ASK, Draft, Page, inline, string
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.recording import Recording
 from strapdown.sensors.catalogue import SENSORS, load_sensor
@@ -25,33 +24,7 @@ from strapdown.tables.checks import index_of
 GRADES = ("navigation", "tactical")
 
 
-@dataclass(frozen=True)
-class ProposedAlignment:
-    """Proposed configuration as text.
-
-    Attributes
-    ----------
-    found : tuple of str
-        Findings from the log and the fixes.
-    asked : tuple of Asked
-        Questions that the user has to answer.
-    findings : tuple of Finding
-        Findings of reading.
-    to_check : tuple of Asked
-        Assumptions to check.
-    offers : tuple of Offered
-        Tables that are comments in the text.
-    """
-
-    text: str
-    found: tuple[str, ...]
-    asked: tuple[Asked, ...]
-    findings: tuple[Finding, ...]
-    to_check: tuple[Asked, ...] = ()
-    offers: tuple[Offered, ...] = ()
-
-
-def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> ProposedAlignment:
+def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> Draft:
     """Write the proposed alignment configuration of a log.
 
     Parameters
@@ -85,8 +58,7 @@ def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> 
         if name == "coarse":
             page.say("duration_s = 100.0: over the first part alone, and the fine one after it")
     _rest(page)
-    text = "\n".join(page.lines) + "\n"
-    return ProposedAlignment(text, tuple(found), tuple(page.asked), findings)
+    return Draft(page.text, tuple(found), tuple(page.asked), findings=findings)
 
 
 def log_table(

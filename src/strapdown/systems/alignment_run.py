@@ -20,7 +20,7 @@ from strapdown.alignment.readiness import (
     manoeuvres_after,
     readiness,
 )
-from strapdown.bundle import InputFiles, Seal
+from strapdown.bundle import InputFiles
 from strapdown.config.alignment import AlignmentSpec, ReferenceTable, sensors_of
 from strapdown.dsp.outliers import REPLACED, OutlierDesign
 from strapdown.dsp.samples import even_step
@@ -66,6 +66,8 @@ class AlignmentRun(SavedRun):
     memory : Memory
         Tables that are given in memory; files of the bundle.
     """
+
+    bundle = "strapdown.report.alignment:ALIGNMENT"
 
     spec: AlignmentSpec
     source: AlignmentSource
@@ -115,12 +117,6 @@ class AlignmentRun(SavedRun):
         if kind != "attitude":
             chart = replace(chart, panels=(chart.panels[EULER.index(kind)],))
         return ChartFigure(chart)
-
-    @staticmethod
-    def _writer() -> Callable[..., Seal]:
-        from strapdown.report.alignment import ALIGNMENT
-
-        return ALIGNMENT.write
 
     def __repr__(self) -> str:
         last = self.attitude.iloc[-1]

@@ -6,7 +6,7 @@ import math
 import shutil
 import tempfile
 import weakref
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import pandas as pd
 
-from strapdown.bundle import InputFiles, Seal, log_files
+from strapdown.bundle import InputFiles, log_files
 from strapdown.config.logs import AllanSpec, AxesTable, LogTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84
@@ -107,6 +107,8 @@ class AllanRun(SavedRun):
         The stationary stretch of each log, with the means of its channels.
     rate_hz : float
     """
+
+    bundle = "strapdown.report.allan:ALLAN"
 
     configuration: ClassVar[str] = "spec"
 
@@ -204,12 +206,6 @@ class AllanRun(SavedRun):
         from strapdown.report.chart_svg import ChartFigure
 
         return ChartFigure(allan_chart(self))
-
-    @staticmethod
-    def _writer() -> Callable[..., Seal]:
-        from strapdown.report.allan import ALLAN
-
-        return ALLAN.write
 
     def __repr__(self) -> str:
         shown = [
@@ -377,7 +373,7 @@ def _temperature(log: LogTable, recording: Recording, stamps: Array) -> Array | 
 
 
 def _said(code: str, name: str, **data: Any) -> Finding:
-    return Finding(code, severity="warning", file=name, data=data)
+    return Finding(code, file=name, data=data)
 
 
 def _limits(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle import InputFiles, Seal, input_files, sensor_file
+from strapdown.bundle import InputFiles, input_files, sensor_file
 from strapdown.config.logs import AxesTable, CalibrateSpec, KnownTurn, LogTable
 from strapdown.config.toml_text import string
 from strapdown.earth import gravity
@@ -77,6 +77,8 @@ class CalibrateRun(SavedRun):
     findings : tuple of Finding
     """
 
+    bundle = "strapdown.report.calibrate:CALIBRATE"
+
     configuration: ClassVar[str] = "spec"
 
     spec: CalibrateSpec
@@ -134,12 +136,6 @@ class CalibrateRun(SavedRun):
         if chart is None:
             raise DataError("calibrate.magnetometer-alone", quantity="calibration")
         return ChartFigure(chart)
-
-    @staticmethod
-    def _writer() -> Callable[..., Seal]:
-        from strapdown.report.calibrate import CALIBRATE
-
-        return CALIBRATE.write
 
     def __repr__(self) -> str:
         found = self.calibration
@@ -364,16 +360,16 @@ def _said(found: ImuCalibration, spec: CalibrateSpec, name: str) -> Iterable[Fin
             code = "calibrate.not-observed-both"
         elif data["turns"]:
             code = "calibrate.not-observed-turns"
-        yield Finding(code, severity="warning", file=name, data=data)
+        yield Finding(code, file=name, data=data)
     if spec.lat_deg is None and spec.gravity_m_per_s2 is None:
         percent = 100.0 * GRAVITY_SD / GRAVITY
         yield Finding("calibrate.gravity", severity="note", file=name, data={"percent": percent})
     if found.excess["accel"] > LARGE_EXCESS:
         mg = found.excess["accel"] / 9.80665e-3
-        yield Finding("calibrate.rests-disagree", severity="warning", file=name, data={"mg": mg})
+        yield Finding("calibrate.rests-disagree", file=name, data={"mg": mg})
     if found.excess["turns"] > LARGE_TILT:
         deg = found.excess["turns"] / DEG
-        yield Finding("calibrate.turns-disagree", severity="warning", file=name, data={"deg": deg})
+        yield Finding("calibrate.turns-disagree", file=name, data={"deg": deg})
 
 
 def _poses(remedies: Sequence[str]) -> list[str]:

@@ -12,10 +12,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.bundle import InputFiles, Seal, log_files
+from strapdown.bundle import InputFiles, log_files
 from strapdown.config.logs import (
     AxesTable,
     DoctorSpec,
@@ -26,7 +25,15 @@ from strapdown.config.logs import (
 )
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.samples import running_integral, white_sd
-from strapdown.errors import ConfigError, DataError, Finding, Severity, StrapdownError
+from strapdown.errors import (
+    ConfigError,
+    DataError,
+    Finding,
+    Severity,
+    StrapdownError,
+    add_note,
+    add_warning,
+)
 from strapdown.evaluation.differences import rotation_contradicted
 from strapdown.formats import (
     READERS,
@@ -74,8 +81,6 @@ from strapdown.systems.navigation_proposal import (
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, MAG, POSITION_SD, find_gaps
 from strapdown.tables.checks import index_of, values_of
-
-Array = NDArray[np.float64]
 
 #: Uses that a log is judged for.
 USES = ("attitude", "navigation", "crash")
@@ -165,6 +170,8 @@ class Diagnosis(SavedRun):
         Questions, faults and notes of every log, and `between`.
     """
 
+    bundle = "strapdown.report.doctor:DOCTOR"
+
     configuration: ClassVar[str] = "spec"
 
     spec: DoctorSpec
@@ -183,12 +190,6 @@ class Diagnosis(SavedRun):
         """One row per stream: log, name, rows, first and last stamp in s, rate in Hz."""
         rows = [{"log": log.name, **one} for log in self.logs for one in log.data["streams"]]
         return pd.DataFrame(rows)
-
-    @staticmethod
-    def _writer() -> Callable[..., Seal]:
-        from strapdown.report.doctor import DOCTOR
-
-        return DOCTOR.write
 
     def __repr__(self) -> str:
         said = "; ".join(
@@ -657,30 +658,27 @@ def _between(logs: Sequence[LogDiagnosis]) -> list[Finding]:
             try:
                 fit = align_second_log(base.streams["imu"], other.streams["imu"])
             except DataError as error:
-                found.append(
-                    Finding(
-                        "doctor.logs-not-aligned",
-                        severity="note",
-                        file=base.name,
-                        quantity="time",
-                        other=other.name,
-                        reason=error.finding,
-                    )
-                )
-                continue
-            apart = abs(fit.offset) > max(3.0 * fit.offset_sd, 0.02)
-            found.append(
-                Finding(
-                    "doctor.logs-apart" if apart else "doctor.logs-on-one-clock",
-                    severity="warning" if apart else "note",
-                    offset=fit.offset,
-                    sd=fit.offset_sd,
-                    drift_ppm=fit.drift_ppm,
-                    drift_sd_ppm=fit.drift_sd_ppm,
+                add_note(
+                    found,
+                    "doctor.logs-not-aligned",
                     file=base.name,
                     quantity="time",
                     other=other.name,
+                    reason=error.finding,
                 )
+                continue
+            apart = abs(fit.offset) > max(3.0 * fit.offset_sd, 0.02)
+            add_warning(
+                found,
+                "doctor.logs-apart" if apart else "doctor.logs-on-one-clock",
+                severity="warning" if apart else "note",
+                offset=fit.offset,
+                sd=fit.offset_sd,
+                drift_ppm=fit.drift_ppm,
+                drift_sd_ppm=fit.drift_sd_ppm,
+                file=base.name,
+                quantity="time",
+                other=other.name,
             )
     return found
 
@@ -1006,15 +1004,14 @@ def _navigation(one: LogDiagnosis) -> list[Finding]:
     sd = values_of(gnss, POSITION_SD)[:, 0]
     finite = sd[np.isfinite(sd)]
     assumed = "position_sd_taken" in gnss.attrs
-    found.append(
-        Finding(
-            "doctor.fixes-without-sd" if assumed else "doctor.fixes",
-            severity="warning" if assumed else "note",
-            file=one.name,
-            count=inside.size,
-            percent=100.0 * float(inside[-1] - inside[0]) / float(stamps[-1] - stamps[0]),
-            sd=float(np.median(finite)) if finite.size else math.inf,
-        )
+    add_warning(
+        found,
+        "doctor.fixes-without-sd" if assumed else "doctor.fixes",
+        severity="warning" if assumed else "note",
+        file=one.name,
+        count=inside.size,
+        percent=100.0 * float(inside[-1] - inside[0]) / float(stamps[-1] - stamps[0]),
+        sd=float(np.median(finite)) if finite.size else math.inf,
     )
     listed = [f for f in one.faults if f.code.startswith("navigation.") or f.code in _LIMITS]
     found += [f for f in listed if f not in found]
@@ -1046,15 +1043,14 @@ def _crash(one: LogDiagnosis) -> list[Finding]:
         return [*found, _without_force(one, "doctor.no-specific-force", "error")]
     change = impact["delta_v_m_per_s"]
     hit = change >= EVENT_DV
-    found.append(
-        Finding(
-            "doctor.impact" if hit else "doctor.no-impact",
-            severity="warning" if hit else "error",
-            file=one.name,
-            delta_v=3.6 * change,
-            at=impact["at_s"],
-            peak=impact["largest_m_per_s2"] / STANDARD_GRAVITY,
-        )
+    add_warning(
+        found,
+        "doctor.impact" if hit else "doctor.no-impact",
+        severity="warning" if hit else "error",
+        file=one.name,
+        delta_v=3.6 * change,
+        at=impact["at_s"],
+        peak=impact["largest_m_per_s2"] / STANDARD_GRAVITY,
     )
     rate = _rate(one)
     if rate < 0.99 * EVENT_RATE:

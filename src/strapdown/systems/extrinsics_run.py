@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import pandas as pd
 
-from strapdown.bundle import InputFiles, Seal, input_files, log_files
+from strapdown.bundle import InputFiles, input_files, log_files
 from strapdown.config.extrinsics import ExtrinsicsSpec
 from strapdown.config.logs import AxesTable
 from strapdown.errors import DataError, Finding
@@ -63,6 +63,8 @@ class ExtrinsicsRun(SavedRun):
         Of an antenna: the smoothed run.
     """
 
+    bundle = "strapdown.report.extrinsics:EXTRINSICS"
+
     configuration: ClassVar[str] = "spec"
 
     spec: ExtrinsicsSpec
@@ -104,12 +106,6 @@ class ExtrinsicsRun(SavedRun):
         from strapdown.report.extrinsics import match_chart
 
         return ChartFigure(match_chart(self))
-
-    @staticmethod
-    def _writer() -> Callable[..., Seal]:
-        from strapdown.report.extrinsics import EXTRINSICS
-
-        return EXTRINSICS.write
 
     def __repr__(self) -> str:
         shown = [

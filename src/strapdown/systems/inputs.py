@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -18,6 +17,7 @@ from strapdown.bundle import InputFiles, Seal, check_destination, input_files, w
 from strapdown.config.reading import FileSpec
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.recording import ReadOptions
+from strapdown.lazy_names import named
 from strapdown.progress import Progress, silent
 from strapdown.tables.on_disk import let_go
 from strapdown.tables.sample_clock import ends_of_part
@@ -257,19 +257,16 @@ def configuration_file(file: Path | None) -> tuple[InputFiles, ...]:
     return () if file is None else (input_files("configuration", str(file), (file,)),)
 
 
-class SavedRun(ABC):
+class SavedRun:
     """Result of a run: data in memory until `save` writes it."""
 
     #: Field with the configuration that names the paths of the inputs.
     configuration: ClassVar[str] = "spec"
+    #: Its `ReportBundle`, imported on demand: ``module:name``.
+    bundle: ClassVar[str]
     inputs: tuple[InputFiles, ...]
     findings: tuple[Finding, ...]
     memory: Memory
-
-    @staticmethod
-    @abstractmethod
-    def _writer() -> Callable[..., Seal]:
-        """Function that writes the bundle; imported on demand."""
 
     def in_folder(self, old: Path, new: Path) -> Self:
         """Return the run with its inputs in memory moved from one folder to another."""
@@ -304,7 +301,7 @@ class SavedRun(ABC):
             An input file has changed since it was read.
         """
         check_destination(Path(out), force)
-        write = self._writer()
+        write: Callable[..., Seal] = named(self.bundle).write
         with self.memory.as_files() as folder:
             run = self.in_folder(NOWHERE, folder)
             return write(run, out, report=report, force=force, progress=progress)

@@ -107,7 +107,7 @@ def _lever_arm(table: pd.DataFrame, aid: Gnss) -> tuple[Finding, ...]:
     stated = np.any(np.asarray(aid.lever_arm)) or np.any(np.asarray(aid.lever_arm_sd) > ARM_SD)
     if sd is None or stated or not aid.use_position:
         return ()
-    what = Finding("navigation.lever-arm-zero", severity="warning", name=aid.name, sd_m=sd)
+    what = Finding("navigation.lever-arm-zero", name=aid.name, sd_m=sd)
     return (what,)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.logs import FixesTable, LogTable
 from strapdown.config.navigation import STAGES
-from strapdown.config.toml_text import ASK, Offered, Page, inline, named_from, string
+from strapdown.config.toml_text import ASK, Draft, Offered, Page, inline, named_from, string
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.samples import true_runs
 from strapdown.errors import DataError, Finding
@@ -27,7 +27,6 @@ from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.aid_proposal import BEGIN, Magnetic, propose_aids, propose_magnetometer
 from strapdown.systems.alignment_draft import (
-    ProposedAlignment,
     axes_table,
     listed_kinds,
     log_table,
@@ -63,7 +62,7 @@ def draft_navigation(
     foot: bool = False,
     truth: Path | None = None,
     progress: Progress = silent,
-) -> ProposedAlignment:
+) -> Draft:
     """Write the proposed navigation configuration of a log.
 
     Parameters
@@ -126,12 +125,12 @@ def draft_navigation(
     if truth is not None:
         found.append(f"{truth.name}: a reference trajectory, to compare the result with")
     _rest(page, foot, None if truth is None else named_from(truth, folder))
-    return ProposedAlignment(
+    return Draft(
         page.text,
         tuple(found),
         tuple(page.asked),
-        made.findings,
         tuple(page.to_check),
+        made.findings,
         tuple(_offers(made, magnetic, folder)),
     )
 

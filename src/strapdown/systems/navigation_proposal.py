@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Site
 from strapdown.alignment.course_sums import Antenna
@@ -19,7 +18,7 @@ from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.alignment.inertial_frame import InertialFrame, fit_inertially, heading_rate
 from strapdown.alignment.inertial_sums import sum_inertially
 from strapdown.config.logs import AxesTable, FixesTable, LogTable
-from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
+from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY, Array
 from strapdown.errors import DataError, DivergenceError, Finding
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
@@ -65,8 +64,6 @@ from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, values_of
-
-Array = NDArray[np.float64]
 
 #: Windows in which noise is measured, s, and the share taken as the quiet one.
 WINDOW, QUIET = 2.0, 0.05

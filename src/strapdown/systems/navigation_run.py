@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine import FineResult
 from strapdown.alignment.gnss_course import GnssCourse
-from strapdown.bundle import InputFiles, Seal
+from strapdown.bundle import InputFiles
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import (
     CoarseModeSpec,
@@ -28,8 +28,9 @@ from strapdown.config.navigation import (
     make_aids,
     make_filter,
 )
+from strapdown.constants import Triple
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
-from strapdown.errors import DivergenceError, Finding, StrapdownError
+from strapdown.errors import DivergenceError, Finding, StrapdownError, add_note
 from strapdown.estimation.robust import DOUBT
 from strapdown.evaluation.trajectory_differences import (
     DifferenceSummary,
@@ -394,14 +395,12 @@ def _with_offsets(
             error, sd = (float(of[name].iloc[-1]) for of in (record.sensors, record.sensors_sd))
             if abs(error) > max(CONTINUED, SURELY * sd):
                 aid = replace(aid, time_offset=aid.time_offset - error)
-                findings.append(
-                    Finding(
-                        "navigation.run-again-with-offset",
-                        severity="note",
-                        quantity=name,
-                        offset=aid.time_offset,
-                        sd=sd,
-                    )
+                add_note(
+                    findings,
+                    "navigation.run-again-with-offset",
+                    quantity=name,
+                    offset=aid.time_offset,
+                    sd=sd,
                 )
         aids.append(aid)
     if findings:
@@ -433,14 +432,12 @@ def _with_known_offsets(
             if known is not None and displaced > DISPLACED * aid.position_sd_factor * fix:
                 error, sd = known
                 aid = replace(aid, time_offset=aid.time_offset - error, time_offset_sd=sd)
-                findings.append(
-                    Finding(
-                        "navigation.run-again-with-known-offset",
-                        severity="note",
-                        quantity=name,
-                        offset=aid.time_offset,
-                        sd=sd,
-                    )
+                add_note(
+                    findings,
+                    "navigation.run-again-with-known-offset",
+                    quantity=name,
+                    offset=aid.time_offset,
+                    sd=sd,
                 )
         aids.append(aid)
     if findings:
@@ -525,7 +522,6 @@ def _recovered(
         findings = (
             Finding(
                 "navigation.run-again-with-noise",
-                severity="warning",
                 quantity="position",
                 count=len(wrong),
                 begin=min(one.begin for one in wrong),
@@ -781,6 +777,8 @@ class NavigationRun(SavedRun):
         Tables that are given in memory; files of the bundle.
     """
 
+    bundle = "strapdown.report.navigation:NAVIGATION"
+
     spec: NavigationSpec
     source: NavigationSource
     ellipsoid: Ellipsoid
@@ -874,12 +872,6 @@ class NavigationRun(SavedRun):
 
         return plot(self, kind)
 
-    @staticmethod
-    def _writer() -> Callable[..., Seal]:
-        from strapdown.report.navigation import NAVIGATION
-
-        return NAVIGATION.write
-
     def __repr__(self) -> str:
         time, smoothed = self.trajectory.index, "" if self.forward is None else ", smoothed"
         last = self.sd.iloc[-1]
@@ -896,9 +888,6 @@ class NavigationRun(SavedRun):
 
 
 # The pipeline of a configuration.
-
-
-Three = tuple[float, float, float]
 
 
 def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> NavigationPipeline:
@@ -988,6 +977,6 @@ def _known(start: StartTable) -> KnownStart:
     )
 
 
-def _three(value: float | Three) -> Three:
+def _three(value: float | Triple) -> Triple:
     x, y, z = (float(v) for v in np.broadcast_to(value, 3))
     return x, y, z

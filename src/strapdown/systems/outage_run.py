@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle import InputFiles, Seal, sensor_file
+from strapdown.bundle import InputFiles, sensor_file
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.outage import OutageSpec, OutageStartTable
@@ -95,6 +95,8 @@ class OutageRun(SavedRun):
         Tables of the navigation run that are given in memory; files of the bundle.
     """
 
+    bundle = "strapdown.report.outage:OUTAGE"
+
     configuration: ClassVar[str] = "navigation"
 
     spec: OutageSpec
@@ -157,12 +159,6 @@ class OutageRun(SavedRun):
         from strapdown.report.outage_document import cone_chart
 
         return ChartFigure(cone_chart(self))
-
-    @staticmethod
-    def _writer() -> Callable[..., Seal]:
-        from strapdown.report.outage import OUTAGE
-
-        return OUTAGE.write
 
     def __repr__(self) -> str:
         time, bound = self.forecast.time[-1], self.forecast.bound[-1]

@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.constants import Array as Array
 from strapdown.errors import DataError
 from strapdown.tables.on_disk import let_go, parts_of, step_range
 
-Array = NDArray[np.float64]
 # Upper limits of any rate and specific force; squares of larger ones soon overflow a double. A
 # shell is fired with 1e6 m/s².
 IMPOSSIBLE_RATE = 1e6  # rad/s

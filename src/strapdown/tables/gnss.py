@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.constants import Array
 from strapdown.dsp.samples import running_integral
 from strapdown.errors import DataError
 from strapdown.frames import place_difference
@@ -31,8 +32,6 @@ from strapdown.tables.checks import (
     values_of,
 )
 from strapdown.units import SPEEDS
-
-Array = NDArray[np.float64]
 
 GNSS = [*GEODETIC, *VELOCITY, *POSITION_SD, *VELOCITY_SD, "quality"]
 

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from strapdown._kernels.motion_increments import split_increment
-from strapdown.mechanization.mechanization import Array
+from strapdown.constants import Array
 from strapdown.mechanization.ned import NorthEastDown
 
 

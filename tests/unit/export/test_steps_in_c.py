@@ -24,10 +24,9 @@ from strapdown.errors import ConfigError
 from strapdown.export import export_c, steps
 from strapdown.export.attitude import export_attitude
 from strapdown.export.cost import most_operations
-from strapdown.export.navigation import ATTITUDE, PLACE, VELOCITY
 from strapdown.export.program import ROWS, drawn_rows
 from strapdown.export.sources import Constant
-from strapdown.export.steps import STEPS
+from strapdown.export.steps import ATTITUDE, PLACE, STEPS, VELOCITY
 from strapdown.nav_state import NavState
 
 VARIANTS = [

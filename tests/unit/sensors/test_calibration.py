@@ -14,6 +14,7 @@ from tests.calibrated import (
     between,
     by_hand,
     facing,
+    in_accel_axes,
     positions,
     record,
     truth,
@@ -26,7 +27,6 @@ from strapdown.sensors.calibration import (
     KnownRotation,
     SensorCalibration,
     calibrate_imu,
-    in_accel_axes,
 )
 from strapdown.sensors.error_chain import compensate
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors

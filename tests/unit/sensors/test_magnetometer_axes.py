@@ -17,6 +17,7 @@ from tests.calibrated import (
     about_vertical,
     between,
     facing,
+    in_accel_axes,
     moved_by_hand,
     record,
     turned,
@@ -26,7 +27,7 @@ from tests.calibrated import (
 import strapdown as sd
 from strapdown import rotation
 from strapdown.formats import csv
-from strapdown.sensors.calibration import SensorCalibration, in_accel_axes
+from strapdown.sensors.calibration import SensorCalibration
 from strapdown.sensors.magnetometer import SHAPES
 from strapdown.sensors.magnetometer_poses import ROTATION_PRIOR, calibrate_by_poses
 

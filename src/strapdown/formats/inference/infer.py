@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import Array
 from strapdown.errors import DataError
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.find_columns import AXES, Column, find_columns, with_reversed
@@ -32,7 +33,6 @@ from strapdown.tables.checks import all_finite
 from strapdown.tables.on_disk import let_go
 from strapdown.units import INFERRED, MAG_UNITS, TIME_UNITS, factor_of, parse_unit
 
-Array = NDArray[np.float64]
 # Of a longer log the signals are judged in contiguous parts, spread evenly over it so that rests
 # and motion are both in them, with this many rows in total. A part lasts long compared with the
 # windows in which gravity rotates (`HALF_WIDTHS`), if the parts are not too few, and never less

@@ -10,7 +10,7 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import MAD_TO_SD
+from strapdown.constants import MAD_TO_SD, Array
 from strapdown.dsp.samples import occupied_grid, running_integral
 from strapdown.errors import Finding
 from strapdown.formats.inference.conclusion import (
@@ -23,8 +23,6 @@ from strapdown.formats.inference.conclusion import (
     posterior,
 )
 from strapdown.units import GYRO_UNITS, INFERRED, TIME_UNITS, factor_of
-
-Array = NDArray[np.float64]
 
 # Prior of the unit of an unlabeled gyro.
 _PRIOR = {"rad/s": 0.55, "deg/s": 0.43, "mdeg/s": 0.01, "mrad/s": 0.005, "deg/h": 0.005}

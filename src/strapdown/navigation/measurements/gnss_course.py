@@ -10,15 +10,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.constants import MAD_TO_SD
+from strapdown.constants import MAD_TO_SD, Array
 from strapdown.dsp.samples import running_integral
 from strapdown.errors import DataError, Finding
 from strapdown.frames import place_difference
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD, usable
 from strapdown.tables.checks import channels_of, index_of, source_of, values_of
 from strapdown.tables.on_disk import filled
-
-Array = NDArray[np.float64]
 
 #: Number of steps of a course needed.
 LEAST_STEPS = 20

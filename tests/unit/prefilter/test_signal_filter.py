@@ -5,7 +5,7 @@ import pytest
 
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import COVARIANCES
-from strapdown.estimation.signal_filter import SignalFilter
+from strapdown.prefilter.w_d import SignalFilter
 
 STEP = 1e-3
 
