@@ -858,7 +858,7 @@ def test_the_sheet_with_the_most_numbers(tmp_path):
     np.testing.assert_allclose(recording.imu[GYRO].to_numpy(), RATE, rtol=1e-15, atol=1e-15)
     np.testing.assert_allclose(recording.imu[ACCEL].to_numpy(), FORCE, rtol=1e-15, atol=1e-15)
     told = next(f for f in recording.findings if f.code == "io.sheet-read")
-    assert told.data["name"] == "Data" and told.data["others"] == ("Notes",)
+    assert told.data["names"] == ("Data",) and told.data["others"] == ("Notes",)
     truncations(path, tmp_path, "imu", 8)
 
 
