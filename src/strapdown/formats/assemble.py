@@ -33,6 +33,7 @@ from strapdown.formats.find_columns import (
     Column,
     advances,
     find_columns,
+    is_of_series,
     names_of_fixes,
     reference,
     steady_triads,
@@ -424,7 +425,9 @@ def _likely_clock(raw: RawLog, found: dict[str, Column]) -> str:
     used = {column.source for column in found.values()}
     likely = []
     for name, values in raw.columns.items():
-        if name not in used and values.dtype.kind in "iuf" and advances(values):
+        if name in used or values.dtype.kind not in "iuf" or is_of_series(raw, name):
+            continue
+        if advances(values):
             likely.append(name)
     return likely[0] if len(likely) == 1 and not set(",=") & set(likely[0]) else ""
 

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 #: Codes that say that a recording does not have a stream, which is not a fault.
 ABSENT = {
     "io.no-stream",
+    "io.accelerometer-alone",
     "io.no-gyro-columns",
     "io.no-gyro-columns-left-out",
     "io.table-of-positions",
