@@ -23,6 +23,7 @@ from strapdown.config.logs import (
     LogTable,
     flags_of,
     flags_of_fixes,
+    with_answers,
 )
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.samples import running_integral, white_sd
@@ -433,16 +434,8 @@ def _inertial(log: LogTable, axes: str | None) -> _Inertial:
         if not new or PLACEHOLDERS & set(new.values()):
             break
         answers |= new
-        log = _answered(log, new)
+        log = with_answers(log, new)
     return _Inertial(log, None, None, (), tuple(questions), answers, refused)
-
-
-def _answered(log: LogTable, answers: Mapping[str, str]) -> LogTable:
-    keys = LogTable.model_fields
-    columns = log.columns | {q: c for q, c in answers.items() if q not in keys}
-    stated: dict[str, Any] = {q: a for q, a in answers.items() if q in keys}
-    stated |= {"repair": True} if "repair" in answers else {}
-    return log.model_copy(update={**stated, "columns": columns})
 
 
 def _others(

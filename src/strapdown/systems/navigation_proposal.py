@@ -18,13 +18,13 @@ from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.alignment.inertial_frame import InertialFrame, fit_inertially, heading_rate
 from strapdown.alignment.inertial_sums import sum_inertially
-from strapdown.config.logs import AxesTable, FixesTable, LogTable
+from strapdown.config.logs import AxesTable, FixesTable, LogTable, with_answers
 from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
-from strapdown.errors import DataError, DivergenceError, Finding
+from strapdown.errors import DataError, DivergenceError, Finding, StrapdownError
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import open_fixes, read_gnss
-from strapdown.formats.recording import Recording
+from strapdown.formats.recording import PLACEHOLDERS, Recording, as_stated
 from strapdown.frames import ways_between
 from strapdown.navigation.measurements.clock_windows import (
     ClockStep,
@@ -40,7 +40,11 @@ from strapdown.navigation.measurements.gnss_clock import (
     check_overlap,
     sure_delay,
 )
-from strapdown.navigation.measurements.gnss_course import check_forward, check_turns
+from strapdown.navigation.measurements.gnss_course import (
+    check_forward,
+    check_turns,
+    unit_of_turns,
+)
 from strapdown.navigation.measurements.gnss_readiness import (
     check_fixes,
     float_position_sd,
@@ -246,7 +250,10 @@ def propose(
         Called with a stage and the share that is done.
     """
     progress("reading", 0.1)
-    recording, imu, findings = body_record(log, AxesTable(axes=axes))
+    try:
+        recording, imu, findings = body_record(log, AxesTable(axes=axes))
+    except DataError as error:
+        raise _answered_by_turns(error, log, axes, gnss) from None
     require_accel(recording)
     table: dict[str, Any] = {"log": log.model_dump(exclude_none=True), "axes": {"axes": axes}}
     fixes = None
@@ -254,12 +261,7 @@ def propose(
     if opened is not None:
         gnss = FixesTable(path=log.path)
     if gnss is not None:
-        asked = replace(
-            gnss.options(),
-            unstated_position_sd=CODE_POSITION_SD,
-            unstated_velocity_sd=CODE_VELOCITY_SD,
-        )
-        fixes, shifted = on_clock_of(read_gnss(gnss.path, asked, opened), recording.imu)
+        fixes, shifted = _fixes(gnss, opened, recording)
         findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))
         fixes, repeats = without_repeats(fixes)
         findings = (*findings, *repeats)
@@ -350,6 +352,50 @@ def propose(
             }
         }
     return Proposal(table, recording, imu, fixes, rest, noise, guessed, drives, how, findings)
+
+
+def _fixes(
+    gnss: FixesTable, opened: Any, recording: Recording
+) -> tuple[pd.DataFrame, Finding | None]:
+    """Read fixes onto the clock of a log, with the errors of a code receiver where none are stated.
+
+    `opened`: as of `read_gnss`.
+    """
+    asked = replace(
+        gnss.options(),
+        unstated_position_sd=CODE_POSITION_SD,
+        unstated_velocity_sd=CODE_VELOCITY_SD,
+    )
+    return on_clock_of(read_gnss(gnss.path, asked, opened), recording.imu)
+
+
+def _answered_by_turns(
+    error: DataError, log: LogTable, axes: str | None, gnss: FixesTable | None
+) -> DataError:
+    """Answer the unit of the gyro, where the log leaves it open, by the turns of the fixes.
+
+    Returns the same error if it does not ask for that alone without an answer, or if the turns do
+    not show it.
+    """
+    answers = dict(error.finding.data.get("answers", ()))
+    if [q for q, answer in answers.items() if answer in PLACEHOLDERS] != ["gyro_unit"]:
+        return error
+    try:
+        tried = with_answers(log, {**answers, "gyro_unit": "rad/s"})
+        recording, imu, _ = body_record(tried, AxesTable(axes=axes))
+        opened = open_fixes(log.path) if gnss is None else None
+        fixes, _ = _fixes(gnss or FixesTable(path=log.path), opened, recording)
+        unit = unit_of_turns(fixes, imu)
+    except StrapdownError:
+        return error
+    if unit is None:
+        return error
+    questions = error.finding.data.get("questions") or (error.finding,)
+    asked = [unit if one.quantity == "gyro" else one for one in questions]
+    said = as_stated({**answers, "gyro_unit": str(unit.data["unit"])})
+    if len(asked) == 1:
+        return DataError(unit, **said)
+    return DataError(error.finding, **said, questions=tuple(asked))
 
 
 def _stated(table: dict[str, Any]) -> ImuUncertainty:
