@@ -191,12 +191,12 @@ OF_CRASHES = ("acceleration", "rate", "force", "velocity", "displacement", "time
 # underscore, with or without "per": `_forms` adds these.
 _SPELLINGS = {
     "rad/s": "rad/s рад/с рад/сек rads radps "
-    "rad/sec rads/s rads/sec radian/s radians/s radians/sec rad·s-1 "
+    "rad/sec rads/s rads/sec radian/s radians/s radians/sec rad/second radians/second rad·s-1 "
     "rad*s^-1 rad.s-1 radsec 1/s*rad",
     "mrad/s": "mrad/s",
     "deg/s": "deg/s град/с град/сек °/с °/сек "
     "deg/sec degs degps dps °/s °/sec º/s º/sec degree/s degree/sec degrees/s "
-    "degrees/sec deg/second degsec grad/s d/s",
+    "degrees/sec deg/second degree/second degrees/second degsec grad/s d/s",
     "mdeg/s": "mdeg/s mdps",
     "deg/h": "deg/h deg/hr °/h °/hr º/h dph deg/hour degrees/hour",
     "rpm": "rpm r/min rev/min revs/min tr/min u/min 1/min turns/min turn/min min^-1 min-1 об/мин",
@@ -211,7 +211,8 @@ _SPELLINGS = {
     "gon/s": "gon/s gons/s",
     "m/s2": "n/kg м/с2 м/с² м/с^2 м/сек2 "
     "m/s2 m/s^2 m/s² m/s**2 m/s/s m/sec2 m/sec^2 m/(s*s) m/s*s m/ss mss ms2 ms^2 ms-2 "
-    "mps2 m_per_s_2 m·s-2 m*s^-2 meters/sec/sec meters/s2 meters/s^2",
+    "mps2 m_per_s_2 m·s-2 m*s^-2 meters/sec/sec meters/s2 meters/s^2 "
+    "meters/secondsquared metres/secondsquared meters/second_squared",
     "ft/s2": "ft/s2 ft/s^2 ft/s² ft/s**2 ft/sec2 ft/sec^2 ft/s/s ft/sec/sec fps2 ftps2 feet/s2",
     "cm/s2": "cm/s2 cm/s^2 cm/s² cm/s**2 cm/sec2 cm/sec^2 cm/sec² cm/s/s gal gals",
     "mm/s2": "mm/s2 mm/s^2 mm/s² mm/s**2 mm/sec2 mm/sec^2 mm/s/s",
@@ -317,7 +318,8 @@ def find_unit(text: str, among: Sequence[str] = OF_LOGS) -> tuple[str, str] | No
     """
     if text.strip(" []()") == "T" and "magnetic field" in among:
         return "magnetic field", "T"  # a small letter is a time
-    plain = re.sub(r"\s+", "", text.strip().strip("[]").lower())
+    plain = re.sub(r"\s+per\s+", "/", text.strip().strip("[]").lower())
+    plain = re.sub(r"\s+", "", plain)
     plain = _ENCLOSED.sub(r"\1\2", plain)
     bare = plain.strip("()")
     power = _POWERS.get(re.sub(r"[·*.^_]", "", bare.translate(_RAISED)))

@@ -451,7 +451,7 @@ MOST_REPAIRED = 0.1
 
 def _repair(fault: Finding, count: int) -> dict[str, str]:
     """Return the answer to faults of rows, if it does not cost much of the log."""
-    rows = fault.data.get("count", 1)
+    rows = fault.data.get("lost", fault.data.get("count", 1))
     return {"repair": "true"} if rows <= MOST_REPAIRED * count else {}
 
 

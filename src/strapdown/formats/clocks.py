@@ -666,7 +666,8 @@ def _backward(
         return DataError("io.stamp-repeated", **where, then=then, count=bad.size)
     if wrap := wrap_of(stamps[k], steps[k], usual_step(steps)):
         return DataError("io.time-counter-wraps", **where, here=here, then=then, bits=wrap[0])
-    return DataError("io.time-goes-back", **where, here=here, then=then, count=bad.size)
+    lost = int((ticks[1:] <= np.maximum.accumulate(ticks)[:-1]).sum())
+    return DataError("io.time-goes-back", **where, here=here, then=then, count=bad.size, lost=lost)
 
 
 def usual_step(steps: Array) -> float:

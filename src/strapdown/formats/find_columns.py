@@ -196,8 +196,9 @@ def without_gyro(raw: RawLog, missing: list[str]) -> DataError:
     said = {name: str(read_name(name).quantity) for name in raw.columns}
     force = [n for n, q in said.items() if q.startswith("accel_")]
     force = force if {said[n][-1] for n in force} == set(AXES) else _letters_of_g(raw, said)
-    rates = [n for n, q in said.items() if q.startswith("gyro") and read_name(n).family != "g"]
-    if force and not rates:
+    # The letter g alone is as often a force.
+    other = [n for n in said if n not in force and read_name(n).family not in ("g", "g#")]
+    if force and not any(said[n].startswith("gyro") or _OF_RATES.search(n) for n in other):
         name = raw.files[0].name if raw.files else raw.name
         return raw.fault("io.accelerometer-alone", "gyro", names=force, log=name)
     left_out = [f for f in raw.findings if f.code.startswith("io.left-out")]
@@ -207,6 +208,13 @@ def without_gyro(raw: RawLog, missing: list[str]) -> DataError:
         columns=list(raw.columns) or ["none"],
         left_out=left_out,
     )
+
+
+#: Words of a rate of turn, in names that are not understood.
+_OF_RATES = re.compile(
+    r"gyr|angul|ang[\W_]?(?:vel|rate)|rotat|(?<![a-z])rates?(?![a-z])|omega|ω|dps|(?:deg|rad|°)/s",
+    re.I,
+)
 
 
 def _letters_of_g(raw: RawLog, said: Mapping[str, str]) -> list[str]:

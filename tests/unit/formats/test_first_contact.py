@@ -838,7 +838,8 @@ def test_semicircles(tmp_path):
 @pytest.mark.parametrize("name", ["acc_{} (m/s2)", "G({})"])
 def test_an_accelerometer_alone_is_the_reason(tmp_path, name):
     force = FORCE / (STANDARD_GRAVITY if name[0] == "G" else 1.0)
-    path = tabled(tmp_path, ["time_s", *(name.format(a) for a in "xyz")], [T, force])
+    more = ["time_s", *(name.format(a) for a in "xyz"), *(["G(calibrated)"] * (name[0] == "G"))]
+    path = tabled(tmp_path, more, [T, force, *([0 * T] * (name[0] == "G"))])
     names = tuple(name.format(a) for a in "xyz")
     with pytest.raises(DataError, check=coded("io.accelerometer-alone", names=names)):
         sd.read_imu(path)
@@ -890,8 +891,43 @@ def test_a_stamp_before_a_colon_and_numbers_of_numpy(tmp_path):
         ("rotationRateUnbiased.x", "gyro_x", None),
         ("TimeStartup", "time", None),
         ("head_d_s", None, "s"),
+        ("Angular velocity X in degrees per second", "gyro_x", "deg/s"),
+        ("Acceleration X (meters per second squared)", "accel_x", "m/s2"),
     ],
 )
 def test_further_names_of_columns(name, quantity, unit):
     said = read_name(name)
     assert (said.quantity, said.unit) == (quantity, unit)
+
+
+def test_a_part_of_a_second_beside_a_time_of_day_before_noon(tmp_path):
+    lines = [",".join(["Date", "Time", "ms", *of("gyro", " (deg/s)"), *of("acc", " (g)")])]
+    begin = DAY.replace(hour=9) + timedelta(milliseconds=123)
+    for t, row in zip(T, np.column_stack([RATE * DEG, FORCE / STANDARD_GRAVITY]), strict=True):
+        at = begin + timedelta(seconds=t)
+        stamp = f"{at:%Y-%m-%d},{at:%I:%M:%S %p},{round(at.microsecond / 1e3)}"
+        lines.append(line(stamp, *many(row)))
+    imu = sd.read_imu(written(tmp_path, "log.csv", lines))
+    check(imu)
+    assert imu.attrs["clock_origin"] == pytest.approx(begin.timestamp(), abs=1e-6)
+
+
+def test_a_repair_that_loses_most_of_a_log_is_not_proposed(tmp_path):
+    """Stamps that begin anew each second go back 14 times, and few are later than all before."""
+    cycle = np.round(1e3 * T) % 1000
+    path = tabled(
+        tmp_path, ["time_ms", *of("gyro", "_rads"), *of("acc", "_mss")], [cycle, RATE, FORCE]
+    )
+    with pytest.raises(DataError, check=coded("io.time-goes-back", count=14)) as refused:
+        sd.read_imu(path)
+    assert "flags" not in refused.value.finding.data or "repair" not in str(
+        refused.value.finding.data["flags"]
+    )
+    assert refused.value.finding.data["lost"] == N - 100
+
+
+@pytest.mark.parametrize("name", ["body spin rate {}", "gyrX{}", "omega {} of it"])
+def test_names_that_may_be_of_rates_are_listed(tmp_path, name):
+    names = ["time_s", *of("acc", "_mss"), *(name.format(a) for a in "abc")]
+    with pytest.raises(DataError, check=coded("io.no-gyro-columns")):
+        sd.read_imu(tabled(tmp_path, names, [T, FORCE, RATE]))
