@@ -62,6 +62,10 @@ def read_excel_table(path: Path) -> RawLog:
         raw = join.join(logs, path.name, (path,))
     else:
         used, raw = [name], with_force_summed(_of_sheet(path, name, sheets[name]))
+    for n in sheets:
+        if n not in used and raw.fixes is None and counts[n] and _has_positions(sheets[n]):
+            raw.fixes = _of_sheet(path, n, sheets[n])
+            used.append(n)
     if others := [n for n in sheets if n not in used]:
         add_note(raw.findings, "io.sheet-read", file=path.name, names=used, others=others)
     return raw
@@ -73,6 +77,10 @@ def _sensors_of(title: str, rows: list[list[Any]]) -> list[str]:
     said = [read_name(n) for n in names]
     found = {str(s.quantity) for s in said if not s.linear}
     return [t for t in TRIADS if {"time", *(f"{t}_{a}" for a in "xyz")} <= found]
+
+
+def _has_positions(rows: list[list[Any]]) -> bool:
+    return {"time", "lat", "lon"} <= {read_name(str(cell), FIXES).quantity for cell in rows[0]}
 
 
 def _named_by(title: str, name: str) -> str:

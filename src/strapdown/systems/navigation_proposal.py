@@ -18,13 +18,13 @@ from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.alignment.inertial_frame import InertialFrame, fit_inertially, heading_rate
 from strapdown.alignment.inertial_sums import sum_inertially
-from strapdown.config.logs import AxesTable, FixesTable, LogTable, with_answers
+from strapdown.config.logs import AxesTable, FixesTable, LogTable
 from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
-from strapdown.errors import DataError, DivergenceError, Finding, StrapdownError
+from strapdown.errors import DataError, DivergenceError, Finding
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import open_fixes, read_gnss
-from strapdown.formats.recording import PLACEHOLDERS, Recording, as_stated
+from strapdown.formats.recording import Recording, as_stated
 from strapdown.frames import ways_between
 from strapdown.navigation.measurements.clock_windows import (
     ClockStep,
@@ -40,11 +40,7 @@ from strapdown.navigation.measurements.gnss_clock import (
     check_overlap,
     sure_delay,
 )
-from strapdown.navigation.measurements.gnss_course import (
-    check_forward,
-    check_turns,
-    unit_of_turns,
-)
+from strapdown.navigation.measurements.gnss_course import check_forward, check_turns
 from strapdown.navigation.measurements.gnss_readiness import (
     check_fixes,
     float_position_sd,
@@ -63,7 +59,7 @@ from strapdown.sensors.uncertainty import (
     TriadUncertainty,
     stated_imu,
 )
-from strapdown.systems.alignment_source import body_record
+from strapdown.systems.alignment_source import body_record, gyro_unit_by_turns
 from strapdown.systems.navigation_checks import ARM_SD
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
@@ -374,28 +370,25 @@ def _answered_by_turns(
 ) -> DataError:
     """Answer the unit of the gyro, where the log leaves it open, by the turns of the fixes.
 
-    Returns the same error if it does not ask for that alone without an answer, or if the turns do
-    not show it.
+    Returns the same error if the turns do not show it.
     """
-    answers = dict(error.finding.data.get("answers", ()))
-    if [q for q, answer in answers.items() if answer in PLACEHOLDERS] != ["gyro_unit"]:
-        return error
-    try:
-        tried = with_answers(log, {**answers, "gyro_unit": "rad/s"})
-        recording, imu, _ = body_record(tried, AxesTable(axes=axes))
+
+    def fixes_of(recording: Recording) -> pd.DataFrame:
         opened = open_fixes(log.path) if gnss is None else None
-        fixes, _ = _fixes(gnss or FixesTable(path=log.path), opened, recording)
-        unit = unit_of_turns(fixes, imu)
-    except StrapdownError:
-        return error
+        return _fixes(gnss or FixesTable(path=log.path), opened, recording)[0]
+
+    refused = error.finding
+    unit = gyro_unit_by_turns(log, AxesTable(axes=axes), refused, fixes_of)
     if unit is None:
         return error
-    questions = error.finding.data.get("questions") or (error.finding,)
-    asked = [unit if one.quantity == "gyro" else one for one in questions]
-    said = as_stated({**answers, "gyro_unit": str(unit.data["unit"])})
-    if len(asked) == 1:
-        return DataError(unit, **said)
-    return DataError(error.finding, **said, questions=tuple(asked))
+    said = as_stated({**dict(refused.data["answers"]), "gyro_unit": str(unit.data["unit"])})
+    questions = refused.data.get("questions") or (refused,)
+    asked = tuple(unit if one.quantity == "gyro" else one for one in questions)
+    return (
+        DataError(unit, **said)
+        if len(asked) == 1
+        else DataError(error.finding, **said, questions=asked)
+    )
 
 
 def _stated(table: dict[str, Any]) -> ImuUncertainty:

@@ -742,14 +742,20 @@ def test_sheets_of_single_sensors_are_one_log(tmp_path):
         sheet.append(["Time (s)", *names])
         for row in np.column_stack([STEP * np.arange(len(values)), values]).tolist():
             sheet.append(row)
+    sheet = book.create_sheet("Location")
+    sheet.append(["Time (s)", "Latitude (°)", "Longitude (°)", "Height over ellipsoid (m)"])
+    for k in range(14):
+        sheet.append([float(k), LAT[k], LON[k], 100.0])
     book.create_sheet("Metadata").append(["deviceModel", "x"])
     path = tmp_path / "raw.xlsx"
     book.save(path)
     imu = sd.read_imu(path)
     check(imu)
     told = next(f for f in imu.findings if f.code == "io.sheet-read")
-    assert told.data["names"] == ("Gyroscope", "Accelerometer")
+    assert told.data["names"] == ("Gyroscope", "Accelerometer", "Location")
     assert told.data["others"] == ("Linear", "Metadata")
+    fixes = sd.read_gnss(path, position_sd_m=3.0, columns={"alt": "4"})
+    np.testing.assert_allclose(fixes[["lat", "lon"]], np.column_stack([LAT, LON])[:14], atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -84,6 +84,9 @@ def test_a_proposal_asks_for_the_unit_of_the_turns(tmp_path, by):
     assert it.value.finding.data["flags"] == f"--gyro-unit {unit}"
     with pytest.raises(DataError, check=coded("io.unit-undecided")):
         propose(log)
+    (one, _) = sd.doctor([log.path, gnss]).logs
+    assert [q.code for q in one.questions] == ["navigation.gyro-unit-by-course"]
+    assert (one.log.gyro_unit, {*one.streams}) == (unit, {"imu", "gnss"})
     answer = dict(it.value.finding.data["answers"])
     assert propose(with_answers(log, answer), gnss=FixesTable(path=gnss)).table["log"] == {
         "path": log.path,
