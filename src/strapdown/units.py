@@ -94,6 +94,7 @@ ANGLES: dict[str, float] = {
     "1e-5 deg": 1e-5,
     "1e-6 deg": 1e-6,
     "1e-7 deg": 1e-7,
+    "semicircles": 180.0 / 2.0**31,  # of 32 bits, in files of Garmin
 }
 
 # Mile, foot, inch and pound are those of the international agreement of 1959: 0.3048 m per foot,
@@ -190,12 +191,12 @@ OF_CRASHES = ("acceleration", "rate", "force", "velocity", "displacement", "time
 # underscore, with or without "per": `_forms` adds these.
 _SPELLINGS = {
     "rad/s": "rad/s рад/с рад/сек rads radps "
-    "rad/sec rads/s rads/sec radian/s radians/s radians/sec rad·s-1 "
+    "rad/sec rads/s rads/sec radian/s radians/s radians/sec rad/second radians/second rad·s-1 "
     "rad*s^-1 rad.s-1 radsec 1/s*rad",
     "mrad/s": "mrad/s",
     "deg/s": "deg/s град/с град/сек °/с °/сек "
     "deg/sec degs degps dps °/s °/sec º/s º/sec degree/s degree/sec degrees/s "
-    "degrees/sec deg/second degsec grad/s",
+    "degrees/sec deg/second degree/second degrees/second degsec grad/s d/s",
     "mdeg/s": "mdeg/s mdps",
     "deg/h": "deg/h deg/hr °/h °/hr º/h dph deg/hour degrees/hour",
     "rpm": "rpm r/min rev/min revs/min tr/min u/min 1/min turns/min turn/min min^-1 min-1 об/мин",
@@ -210,8 +211,9 @@ _SPELLINGS = {
     "gon/s": "gon/s gons/s",
     "m/s2": "n/kg м/с2 м/с² м/с^2 м/сек2 "
     "m/s2 m/s^2 m/s² m/s**2 m/s/s m/sec2 m/sec^2 m/(s*s) m/s*s m/ss mss ms2 ms^2 ms-2 "
-    "mps2 m_per_s_2 m·s-2 m*s^-2 meters/sec/sec meters/s2 meters/s^2",
-    "ft/s2": "ft/s2 ft/s^2 ft/s² ft/s**2 ft/sec2 ft/sec^2 ft/s/s fps2 feet/s2",
+    "mps2 m_per_s_2 m·s-2 m*s^-2 meters/sec/sec meters/s2 meters/s^2 "
+    "meters/secondsquared metres/secondsquared meters/second_squared",
+    "ft/s2": "ft/s2 ft/s^2 ft/s² ft/s**2 ft/sec2 ft/sec^2 ft/s/s ft/sec/sec fps2 ftps2 feet/s2",
     "cm/s2": "cm/s2 cm/s^2 cm/s² cm/s**2 cm/sec2 cm/sec^2 cm/sec² cm/s/s gal gals",
     "mm/s2": "mm/s2 mm/s^2 mm/s² mm/s**2 mm/sec2 mm/sec^2 mm/s/s",
     "mGal": "mgal mgals milligal",
@@ -236,7 +238,7 @@ _SPELLINGS = {
     "T": "tesla",
     "mT": "mt millitesla",
     "local_flux": "local_flux localflux local_flux*",
-    "s": "s sec secs second seconds сек секунд секунды",
+    "s": "s sec secs second seconds с сек секунд секунды",
     "ms": "ms msec msecs millis millisecond milliseconds мс миллисекунд миллисекунды 毫秒 ミリ秒",
     "us": "us µs μs usec usecs micros microsecond microseconds мкс микросекунд 微秒",
     "ns": "ns nsec nsecs nanosec nanosecs nanos nanosecond nanoseconds нс наносекунд 纳秒",
@@ -247,6 +249,7 @@ _SPELLINGS = {
     "1e-5 deg": "1e-5deg dege5 deg*1e-5 10^-5deg deg*1e5",
     "1e-6 deg": "1e-6deg dege6 deg*1e-6 10^-6deg microdeg udeg µdeg μdeg deg*1e6",
     "1e-7 deg": "1e-7deg dege7 deg*1e-7 10^-7deg deg*1e7",
+    "semicircles": "semicircles semicircle",
     "m": "m meter metre meters metres",
     "km": "km",
     "cm": "cm",
@@ -290,7 +293,7 @@ _RAISED = str.maketrans({"⁻": "-", "−": "-", "¹": "1", "²": "2"})
 def _forms(spelling: str) -> Iterable[str]:
     yield spelling
     # r_min is rather a least r than revolutions per minute.
-    if "/" in spelling and not spelling.startswith(("1", "r/", "u/")):
+    if "/" in spelling and not spelling.startswith(("1", "r/", "u/", "d/")):
         yield spelling.replace("/", "_")
         yield spelling.replace("/", "_per_")
 
@@ -315,7 +318,8 @@ def find_unit(text: str, among: Sequence[str] = OF_LOGS) -> tuple[str, str] | No
     """
     if text.strip(" []()") == "T" and "magnetic field" in among:
         return "magnetic field", "T"  # a small letter is a time
-    plain = re.sub(r"\s+", "", text.strip().strip("[]").lower())
+    plain = re.sub(r"\s+per\s+", "/", text.strip().strip("[]").lower())
+    plain = re.sub(r"\s+", "", plain)
     plain = _ENCLOSED.sub(r"\1\2", plain)
     bare = plain.strip("()")
     power = _POWERS.get(re.sub(r"[·*.^_]", "", bare.translate(_RAISED)))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
-from typing import Annotated, Literal
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool, model_validator
 
@@ -71,6 +71,15 @@ class LogTable(Spec):
     def part_s(self, first: float) -> tuple[float, float]:
         """Return begin and end of the part to use, as `ends_of_part`."""
         return ends_of_part(first, self.from_s, self.to_s, self.duration_s)
+
+
+def with_answers(log: LogTable, answers: Mapping[str, str]) -> LogTable:
+    """Return the table of a log with answers to its questions, by option or quantity."""
+    keys = LogTable.model_fields
+    columns = log.columns | {q: c for q, c in answers.items() if q not in keys}
+    stated: dict[str, Any] = {q: a for q, a in answers.items() if q in keys}
+    stated |= {"repair": True} if "repair" in answers else {}
+    return log.model_copy(update={**stated, "columns": columns})
 
 
 class FixesTable(Spec):

@@ -14,12 +14,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.aid_table import read_aid_table, read_reference_path
 from strapdown.formats.clocks import EPOCH
-from strapdown.formats.columns import (
-    parse_axes,
-    read_name,
-    split_brackets,
-    without_accents,
-)
+from strapdown.formats.columns import parse_axes, read_name, split_brackets
 from strapdown.formats.crash_edr import KMH, rounding
 from strapdown.formats.crash_record import (
     CrashChannel,
@@ -42,7 +37,7 @@ from strapdown.formats.inference.conclusion import (
 )
 from strapdown.formats.inference.rotation_rate import infer_gyro
 from strapdown.formats.triad_units import mirrored
-from strapdown.formats.vocabularies import AXIS_WORDS, CRASHES
+from strapdown.formats.vocabularies import AXIS_WORDS, CRASHES, without_accents
 from strapdown.sensors.saturation import find_limits
 from strapdown.tables.checks import Array
 from strapdown.units import (

@@ -33,6 +33,7 @@ from strapdown.formats.find_columns import (
     Column,
     advances,
     find_columns,
+    is_of_series,
     names_of_fixes,
     reference,
     steady_triads,
@@ -422,7 +423,9 @@ def _likely_clock(raw: RawLog, found: dict[str, Column]) -> str:
     used = {column.source for column in found.values()}
     likely = []
     for name, values in raw.columns.items():
-        if name not in used and values.dtype.kind in "iuf" and advances(values):
+        if name in used or values.dtype.kind not in "iuf" or is_of_series(raw, name):
+            continue
+        if advances(values):
             likely.append(name)
     return likely[0] if len(likely) == 1 and not set(",=") & set(likely[0]) else ""
 
@@ -446,7 +449,7 @@ MOST_REPAIRED = 0.1
 
 def _repair(fault: Finding, count: int) -> dict[str, str]:
     """Return the answer to faults of rows, if it does not cost much of the log."""
-    rows = fault.data.get("count", 1)
+    rows = fault.data.get("lost", fault.data.get("count", 1))
     return {"repair": "true"} if rows <= MOST_REPAIRED * count else {}
 
 

@@ -67,6 +67,8 @@ _PART_WORDS = {
     "millis": "ms",
 }
 _SECONDS = re.compile(r"[\s_./]*(?:secs?|seconds|s)\W*$", re.I)
+#: The end of a time of day in whole seconds, before which its part is put.
+_WHOLE_TEXT = re.compile(r":\d\d(?=(?:\s*[ap]\.?m\.?)?$)", re.I)
 #: Names of whole seconds in a clock.
 _WHOLE_WORDS = ("sec", "secs", "seconds")
 
@@ -106,7 +108,11 @@ def _whole_and_part(
             elif held.dtype.kind == "O":
                 digits = len(str(_PARTS[unit])) - 1
                 values = np.array(
-                    [f"{t}.{p:0{digits}d}" for t, p in zip(held, ticks, strict=True)], dtype=object
+                    [
+                        _WHOLE_TEXT.sub(rf"\g<0>.{p:0{digits}d}", str(t))
+                        for t, p in zip(held, ticks, strict=True)
+                    ],
+                    dtype=object,
                 )
                 name = whole
             else:
@@ -123,7 +129,7 @@ def _is_whole(name: str, values: NDArray[Any], units: Mapping[str, str]) -> bool
         return bool((values == values.astype("datetime64[s]")).all())
     if values.dtype.kind == "O":
         first = str(values[0]) if values.size else ""
-        return re.search(r":\d\d$", first) is not None and is_stamp(first)
+        return _WHOLE_TEXT.search(first) is not None and is_stamp(first)
     last = re.split(r"[\s_./]+", name.strip().lower())[-1]
     said = read_name(name)
     unit = unit_of(units[name]) if name in units else said.unit

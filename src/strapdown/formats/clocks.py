@@ -31,7 +31,7 @@ from strapdown.formats.inference.conclusion import (
     THRESHOLD,
     differenced,
     infer_time_unit,
-    wrap_bits,
+    wrap_of,
 )
 from strapdown.formats.recording import Origin
 from strapdown.tables.checks import RELATIVE as RELATIVE
@@ -559,7 +559,7 @@ def _wild(stamps: NDArray[Any]) -> NDArray[np.bool_]:
     back = np.flatnonzero(steps < 0)
     usual = usual_step(steps) if back.size else 0.0
     for k in back.tolist():
-        if wrap_bits(float(stamps[k]), float(steps[k]), usual):
+        if wrap_of(float(stamps[k]), float(steps[k]), usual):
             continue
         first = k
         while first > 0 and k - first < WILD_RUN and stamps[first - 1] > stamps[k + 1]:
@@ -664,9 +664,10 @@ def _backward(
         )
     if steps[k] == 0:
         return DataError("io.stamp-repeated", **where, then=then, count=bad.size)
-    if bits := wrap_bits(stamps[k], steps[k], usual_step(steps)):
-        return DataError("io.time-counter-wraps", **where, here=here, then=then, bits=bits)
-    return DataError("io.time-goes-back", **where, here=here, then=then, count=bad.size)
+    if wrap := wrap_of(stamps[k], steps[k], usual_step(steps)):
+        return DataError("io.time-counter-wraps", **where, here=here, then=then, bits=wrap[0])
+    lost = int((ticks[1:] <= np.maximum.accumulate(ticks)[:-1]).sum())
+    return DataError("io.time-goes-back", **where, here=here, then=then, count=bad.size, lost=lost)
 
 
 def usual_step(steps: Array) -> float:
@@ -682,8 +683,8 @@ def _repaired(
     usual = usual_step(steps)
     added = np.zeros(ticks.size)
     for k in np.flatnonzero(steps < 0):
-        if bits := wrap_bits(stamps[k], steps[k], usual):
-            added[k + 1] = 2.0**bits
+        if wrap := wrap_of(stamps[k], steps[k], usual):
+            added[k + 1] = wrap[1]
     if wraps := int(np.count_nonzero(added)):
         ticks = ticks + np.cumsum(added)
         add_note(findings, "io.counter-wrapped-undone", file=file, quantity="time", count=wraps)

@@ -41,6 +41,7 @@ from strapdown.formats.vocabularies import (
     WITH_AXIS,
     WITHOUT_GRAVITY,
     Vocabulary,
+    without_accents,
 )
 from strapdown.units import ACCEL_UNITS, FACTORS, OF_LOGS, find_unit, unit_of, unit_words
 
@@ -73,6 +74,10 @@ _UNIT_INSIDE = re.compile(r"(.*?\S)\s*[\[(]([^\[\]()]+)[\])]\W*([xyzXYZ])")
 _HEMISPHERE = re.compile(
     r"((?:^|.*[\s_])(?:lat|lon|lng)[a-z]*)[\s_(\[]+(?:N/S|E/W|[NSEW])[\])]?$", re.I
 )
+#: What is before the last part of the name of a member.
+_MEMBER = re.compile(r"^.*[./:](?=\w{3})")
+#: The datum of a latitude and a longitude.
+_DATUM = re.compile(r"\W*(?:WGS[-_ ]?84|[EI]TRF?\d*|ETRS[-_ ]?89)\W*", re.I)
 # Clocks of X-Plane's data output: of the simulated world and of all.
 _XPLANE = ("_totl,_time",)
 # Delsys: NAME: GYRO.X 1 (IM) [°/s], each behind its clock, X[s]; a browser: rotationRate.alpha.
@@ -235,6 +240,16 @@ def _read(bare: str, written: str, of: Vocabulary) -> ColumnName:
                 break
     if said.quantity is None and of.sensors and not of.stems:
         said = _by_unit(bare, written, said)
+    if written and unit is None and said.quantity == "time":
+        # Of which clock, before its unit: Time (GPS s).
+        words, its = unit_words(written.lower().split(), ("time",))
+        if its and set(words) <= OF_TIME:
+            return replace(said, unit=its)
+    if written and unit is None and not of.sensors:
+        # The datum of an angle or a height is a part of its name: Alt (HAE), latitude (WGS84).
+        level = _read_words(f"{bare} {written}", None, of, about)
+        if level.quantity or _DATUM.fullmatch(written):
+            return level if level.quantity else said
     quantity = said.quantity
     kind = find_unit(said.unit) if said.unit else None
     if str(quantity).startswith("mag") and said.unit in MAGNETIC:
@@ -302,6 +317,11 @@ def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> Col
         rest = rest[match.end() :]
         if said := _known(rest, of):
             return replace(said, unit=unit or said.unit, loose=1)
+    if not of.sensors and (member := _MEMBER.search(text)):
+        # The member of a message: field.latitude, OSD.altitude.
+        said = _read_words(text[member.end() :], unit, of, about)
+        if said.quantity and not said.loose:
+            return replace(said, loose=1)
     # Names in capitals without separators (latDeg), in another order (x_gyro), with words that say
     # nothing of the quantity (raw_acceleration_x), or twice the same (gyroRotationRateX).
     text, chip = _without_chip(text) if of.sensors else (text, "")
@@ -313,7 +333,9 @@ def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> Col
         whole = "".join(words)
         said = None if about or len(whole) < 3 else _known(whole, of)
         if said is None:
-            clock = "time" in of.quantities and _is_clock(words)
+            behind = of.before is not None and of.before.match("".join(words))
+            bare = words[1:] if behind else words  # location timestamp
+            clock = "time" in of.quantities and _is_clock(bare)
             return ColumnName("time" if clock else None, unit, loose=2)
         return replace(said, unit=unit or said.unit, loose=2)
     bare = [part for w in words if not _is_model(w) for part in re.findall(r"\D+|\d+", w)]
@@ -399,12 +421,6 @@ def _english(word: str) -> tuple[str, ...]:
         if rest not in ("", plain) and (behind := _english(rest)) != (rest,):
             return (stem, *behind)
     return (plain,)
-
-
-def without_accents(text: str) -> str:
-    """Return the letters of a text without their accents."""
-    bare = "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
-    return unicodedata.normalize("NFC", bare)  # the syllables of Korean are whole again
 
 
 def _is_model(word: str) -> bool:

@@ -139,8 +139,8 @@ def _at_once(
     clock = _clock(top.names, columns)
     if clock is not None and len(columns[clock]) > 1 and step_range(columns[clock])[0] < 0.0:
         return None
-    # Nor are blanks beside a separator part of a word.
-    if any(c.dtype.kind == "O" for c in columns) and f"{top.separator} " in text:
+    # Nor are blanks beside a separator, or that begin a line, part of a word.
+    if any(c.dtype.kind == "O" for c in columns) and (f"{top.separator} " in text or "\n " in text):
         return None
     return _log(top, name, files, columns, np.arange(first, first + columns[0].size), findings)
 
@@ -446,6 +446,8 @@ def _parse(lines: list[str], count: int, separator: str | None, name: str) -> Co
     decimal = "," if comma else "."
     if separator is None:
         lines = ["\t".join(line.split()) for line in lines]
+    elif any(line[:1] == " " for line in lines[:JUDGED]):
+        lines = [line.lstrip(" ") for line in lines]
     if separator and separator.strip() and any(f"{separator} " in line for line in lines[:JUDGED]):
         # Blanks beside a separator do not belong to a field.
         around = re.compile(rf"[ \t]*{re.escape(separator)}[ \t]*")

@@ -193,6 +193,14 @@ def without_gyro(raw: RawLog, missing: list[str]) -> DataError:
     """Make the error for a log without three rates; the message lists its columns."""
     if _is_nameless(raw):
         return DataError(_nameless(raw, {}))
+    said = {name: str(read_name(name).quantity) for name in raw.columns}
+    force = [n for n, q in said.items() if q.startswith("accel_")]
+    force = force if {said[n][-1] for n in force} == set(AXES) else _letters_of_g(raw, said)
+    # The letter g alone is as often a force.
+    other = [n for n in said if n not in force and read_name(n).family not in ("g", "g#")]
+    if force and not any(said[n].startswith("gyro") or _OF_RATES.search(n) for n in other):
+        name = raw.files[0].name if raw.files else raw.name
+        return raw.fault("io.accelerometer-alone", "gyro", names=force, log=name)
     left_out = [f for f in raw.findings if f.code.startswith("io.left-out")]
     return raw.fault(
         "io.no-gyro-columns-left-out" if left_out else "io.no-gyro-columns",
@@ -200,6 +208,20 @@ def without_gyro(raw: RawLog, missing: list[str]) -> DataError:
         columns=list(raw.columns) or ["none"],
         left_out=left_out,
     )
+
+
+#: Words of a rate of turn, in names that are not understood.
+_OF_RATES = re.compile(
+    r"gyr|angul|ang[\W_]?(?:vel|rate)|rotat|(?<![a-z])rates?(?![a-z])|omega|ω|dps|(?:deg|rad|°)/s",
+    re.I,
+)
+
+
+def _letters_of_g(raw: RawLog, said: Mapping[str, str]) -> list[str]:
+    """Return the columns of the letter g, read as rates, if they show gravity instead."""
+    three = [n for a in AXES for n, q in said.items() if q == f"gyro_{a}"]
+    whole = len(three) == len(AXES) and all(read_name(n).family == "g" for n in three)
+    return three if whole and _shows_gravity(raw, three) else []
 
 
 def _is_nameless(raw: RawLog) -> bool:
@@ -255,6 +277,15 @@ LARGEST_NORM = 6e4
 def _is_gravity(norm: float) -> bool:
     """Whether a median norm is that of gravity, in m/s², g or mg."""
     return any(low < norm < high for low, high in GRAVITIES)
+
+
+def _shows_gravity(raw: RawLog, names: list[str]) -> bool:
+    """Whether the norm of three columns is that of gravity."""
+    three = [raw.columns[n] for n in names]
+    if any(c.dtype.kind not in "iuf" for c in three):
+        return False
+    norm, spread = norm_and_spread(three)
+    return _is_gravity(norm) and spread < LOOSEST
 
 
 def norm_and_spread(three: list[NDArray[Any]]) -> tuple[float, float]:
@@ -417,6 +448,14 @@ def _varied(column: NDArray[np.generic]) -> Array | None:
         return None
     values = np.asarray(column[:MOST_SAMPLES], dtype=np.float64)
     return values if bool(np.isfinite(values).all()) and np.ptp(values) > 0.0 else None
+
+
+def is_of_series(raw: RawLog, name: str) -> bool:
+    """Whether a column is the first of several that differ in a letter or a number that counts."""
+    return any(
+        name[: m.start()] + chr(ord(m[0]) + 1) + name[m.end() :] in raw.columns
+        for m in _FIRST.finditer(name)
+    )
 
 
 def advances(values: NDArray[Any]) -> bool:
@@ -610,7 +649,7 @@ def _letter_g(
     """Decide what ``gx gy gz`` are: rates beside ``ax ay az``; else gravity, or g, or rates.
 
     Beside other rates they are gravity or acceleration in g: asked, if no other acceleration is
-    there.
+    there. Alone they are no rates if their norm is 1 g, as that of no turn is.
     """
     own = families["gyro", "g"]
     units = {unit_stated(raw, name) for name in own.values()}
@@ -622,12 +661,15 @@ def _letter_g(
     rates = "gyro_x" in wanted or any(
         t == "gyro" and f != "g" and len(m) == 3 for (t, f), m in families.items()
     )
-    if not rates and (whole or not linear) and not units <= set(ACCEL_UNITS):
+    alone = not (rates or linear or units - {None})
+    said = {n: f"gyro_{a}" for a, n in own.items()}
+    gravity = alone and bool(_letters_of_g(raw, said))
+    if not rates and (whole or not linear) and not (gravity or units <= set(ACCEL_UNITS)):
         return
     del families["gyro", "g"]
     if whole or len(own) < len(AXES):
         return
-    triad = "accel" if rates or units <= set(ACCEL_UNITS) else "gyro"
+    triad = "accel" if rates or gravity or units <= set(ACCEL_UNITS) else "gyro"
     names = [own[a] for a in AXES]
     if linear and rates:
         return  # gravity, beside acceleration without it

@@ -35,7 +35,7 @@ from strapdown.formats.writing import (
 from strapdown.tables.checks import POSITION_SD, values_of
 from strapdown.units import SPEEDS
 
-_SENTENCE = re.compile(r"\$([A-Z]{2})([A-Z]{3}),([^*]*)\*([0-9A-Fa-f]{2})\s*$")
+_SENTENCE = re.compile(r"\$([A-Z]{2})([A-Z]{3}),([^*]*)\*([0-9A-Fa-f]{2})(?:[,;\s][\d\s.,:-]*)?$")
 _DAY = 86400.0
 _KNOT = SPEEDS["kn"]
 _NAN3 = (np.nan, np.nan, np.nan)
@@ -43,8 +43,8 @@ _NAN3 = (np.nan, np.nan, np.nan)
 
 #: Fewest fields of a line that may be of a gyro.
 LEAST_FIELDS = 4
-# A sentence among the first lines.
-detect = Signs(first=rb"\$G(?:(?<=\A\$G)|(?<=[\r\n]\$G))[PNLAB]")
+# A sentence among the first lines, which may have a stamp or a word before and a stamp behind it.
+detect = Signs(first=rb"(?m:^[^$\r\n]{0,64}\$G[PNLAB][A-Z]{3},[^*\r\n]*\*[0-9A-Fa-f]{2})")
 
 
 @dataclass

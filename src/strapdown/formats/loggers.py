@@ -52,6 +52,7 @@ def _table(path: Path, rows: list[tuple[int, str]], names: str) -> RawLog:
 VBO_TITLE = "VBO of Racelogic"
 _CREATED = re.compile(r"File created on (\d\d)/(\d\d)/(\d{4})(?: (?:at|@) (\d\d):(\d\d))?", re.I)
 _DAY = 86_400.0
+_DIGITS = "digits"
 _MINUTES, _DIFFERENTIAL, _SATELLITES = 1.0 / 60.0, 64, 63
 
 
@@ -66,7 +67,9 @@ def read_vbo_fixes(path: Path) -> RawLog:
     names = next((lines[k + 1] for k, n in enumerate(lines[:-1]) if n == "[column names]"), "")
     begin = lines.index("[data]") + 1
     rows = [(k, line) for k, line in enumerate(lines[begin:], begin + 1) if line]
-    raw = _table(path, rows, " ".join(name.lower() for name in names.split()))
+    # Under the name of a clock the digits of a time of day would be read as one already.
+    words = [_DIGITS if name == "time" else name for name in names.lower().split()]
+    raw = _table(path, rows, " ".join(words))
     seconds, days = _day_of_vbo(raw, lines)
     held: dict[str, tuple[NDArray[Any], str | None]] = {
         "time": (seconds + days, "s"),
@@ -100,7 +103,7 @@ def _day_of_vbo(raw: RawLog, lines: list[str]) -> tuple[Array, float]:
     The day is the one by which the first row is nearest to the creation of the file, whose clock
     is local; 0 if that is not stated.
     """
-    stamps = column(raw, "time").astype(np.float64)
+    stamps = column(raw, _DIGITS).astype(np.float64)
     hours, rest = np.divmod(stamps, 10_000.0)
     minutes, seconds = np.divmod(rest, 100.0)
     of_day = hours * 3600.0 + minutes * 60.0 + seconds

@@ -350,7 +350,8 @@ def read_racechrono_fixes(path: Path) -> RawLog:
     """Read the rows with a new position."""
     raw, units = _table_of_racechrono(path)
     if not {"latitude gps", "longitude gps"} <= raw.columns.keys():
-        raise lacking(path, "gnss", RACECHRONO_TITLE, ["imu"])
+        there = ["imu"] * (_sensor(raw, units, "gyro") is not None)
+        raise lacking(path, "gnss", RACECHRONO_TITLE, there)
     held: dict[str, tuple[NDArray[Any], str | None]] = {"time": (column(raw, "timestamp"), "s")}
     for quantity, name in RACECHRONO_FIXES.items():
         if f"{name} gps" in raw.columns:

@@ -33,15 +33,15 @@ _TAGGED = re.compile(r"\s*([A-Za-z]\w*):[ \t]*(?=[+-]?[\d.][^:=]*$)")
 # a part of the word before it.
 _PRINTED = re.compile(
     r"(?<![\w.])(?:(?:\d{4}-\d\d-\d\d|\d{1,2}/\d{1,2}/\d{4})[ T])?\d{1,2}:\d\d:\d\d"
-    r"(?:[.,]\d+(?:,\d{3})?)?(?:Z|[+-]\d\d:?\d\d)?(?![\w:])"
+    r"(?:[.,]\d+(?:,\d{3})?)?(?:Z|[+-]\d\d:?\d\d)?(?!\w|:\d)"
     rf"|(?<![\w.^])[+-]{UNSIGNED}|(?<![\w.^+-]){UNSIGNED}|(?<![\w<])[+-]?(?:nan|inf)(?![\w>])",
     re.I,
 )
 # Signs between the values of a vector, at the end of a label, and between its words.
 _BETWEEN = re.compile(r"[,;/| \t-]+")
 _LABEL = re.compile(r"[^\W\d_].*[:=]\s*[\[({<]?$|[^\W\d_].*[\[({<]$|[|,;]\s*[A-Za-z][\w ]*$", re.S)
-# A number as numpy prints it within a dictionary.
-_TYPE = re.compile(r"\b(?:np|numpy)\.\w+\($")
+# A number as numpy prints it within a list or a dictionary.
+_TYPE = re.compile(r"\b(?:np|numpy)\.\w+\(([^()]*)\)")
 #: Labels of a latitude and a longitude.
 _POSITIONS = {"location", "position", "gps", "coordinates", "coords", "latlng", "latlon"}
 # A unit in brackets behind a value.
@@ -71,6 +71,9 @@ def as_rows(numbered: Lines) -> Lines:
     The same object if there are none.
     """
     top = numbered[:SEARCHED]
+    if any(_TYPE.search(line) for _, line in top if len(line) < LONGEST):
+        numbered = [(row, _TYPE.sub(r"\1", line)) for row, line in numbered]
+        top = numbered[:SEARCHED]
     # A semicolon that ends a line of commas, as of a program's statement.
     if all(line.count(";") == 1 and "," in line and line.rstrip()[-1] == ";" for _, line in top):
         numbered = [(row, line.rstrip().removesuffix(";")) for row, line in numbered]
@@ -248,7 +251,7 @@ def _label(text: str, base: str) -> tuple[str, str, str]:
     `base`: of the label before, which an axis alone continues: ``Accel X: 1, Y: 2``.
     """
     unit = ""
-    text = _TYPE.sub("", text[_CLOSED.match(text).end() :])  # type: ignore[union-attr]
+    text = text[_CLOSED.match(text).end() :]  # type: ignore[union-attr]
     if (m := _BEHIND.match(text)) and (found := unit_of(m[1])) is not None:
         unit, text = found, text[m.end() :]
     # A label of one letter may be spelled as a unit: then it is next to the number.

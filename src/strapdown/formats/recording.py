@@ -24,6 +24,7 @@ from strapdown.tables.checks import height_words
 #: Codes that say that a recording does not have a stream, which is not a fault.
 ABSENT = {
     "io.no-stream",
+    "io.accelerometer-alone",
     "io.no-gyro-columns",
     "io.no-gyro-columns-left-out",
     "io.table-of-positions",

@@ -22,18 +22,19 @@ from strapdown.formats.arrays import raw_log
 from strapdown.formats.clock_columns import with_one_clock
 from strapdown.formats.columns import read_name
 from strapdown.formats.gnss_fixes import Fixes
-from strapdown.formats.known_formats import from_json, under
+from strapdown.formats.known_formats import from_json, selected, under
 from strapdown.formats.phone_apps import with_force_summed
 from strapdown.formats.recording import RawLog
 from strapdown.formats.sensor_folder import first_line, peek
 from strapdown.formats.signs import Signs, first_bytes, head, json_beginning
 from strapdown.formats.text_columns import NUMBER, decoded, fields_of
-from strapdown.formats.vocabularies import FIXES
+from strapdown.formats.vocabularies import FIXES, TRIADS
 from strapdown.parsers import parse
 from strapdown.parsers.archives import PACKED, numpy_array
 from strapdown.tables.on_disk import room
 
-# Excel workbooks (``.xlsx``) by openpyxl: the sheet with the most numbers, as a table.
+# Excel workbooks (``.xlsx``) by openpyxl: the sheet with the most numbers, as a table; where it has
+# one sensor alone, that and the sheets of the others.
 #
 # Dates are written as ISO 8601; a cell with a formula has the value that Excel stored. The rest
 # is as in a text table with commas (`csv`), headers and lines above them included.
@@ -43,7 +44,7 @@ detect_excel = Signs(suffixes=(".xlsx", ".xlsm"), first=rb"\APK\x03\x04")
 
 
 def read_excel_table(path: Path) -> RawLog:
-    """Read the sheet with the most numbers."""
+    """Read the sheet with the most numbers, or one of each sensor, on the stamps of the gyro."""
     sheets = parse("workbooks.sheets", path)
     counts = {
         name: sum(isinstance(c, int | float) for row in rows for c in row)
@@ -52,15 +53,52 @@ def read_excel_table(path: Path) -> RawLog:
     name = max(counts, key=lambda n: counts[n], default="")
     if not counts.get(name):
         raise DataError("io.excel-without-numbers", file=path.name, sheets=list(sheets))
+    of_sensors = {n: _sensors_of(n, rows) for n, rows in sheets.items() if counts[n]}
+    used = [n for n, sensors in of_sensors.items() if len(sensors) == 1]
+    sensors = [of_sensors[n][0] for n in used]
+    whole = len(of_sensors[name]) > 1
+    if not whole and "gyro" in sensors and len({*sensors}) == len(sensors) > 1:
+        logs = [_of_sheet(path, n, sheets[n]) for n in used]
+        raw = join.join(logs, path.name, (path,))
+    else:
+        used, raw = [name], with_force_summed(_of_sheet(path, name, sheets[name]))
+    for n in sheets:
+        if n not in used and raw.fixes is None and counts[n] and _has_positions(sheets[n]):
+            raw.fixes = _of_sheet(path, n, sheets[n])
+            used.append(n)
+    if others := [n for n in sheets if n not in used]:
+        add_note(raw.findings, "io.sheet-read", file=path.name, names=used, others=others)
+    return raw
+
+
+def _sensors_of(title: str, rows: list[list[Any]]) -> list[str]:
+    """Return the sensors whose three axes a sheet names beside a clock."""
+    names = [_named_by(title, str(cell)) for cell in rows[0]] if rows else []
+    said = [read_name(n) for n in names]
+    found = {str(s.quantity) for s in said if not s.linear}
+    return [t for t in TRIADS if {"time", *(f"{t}_{a}" for a in "xyz")} <= found]
+
+
+def _has_positions(rows: list[list[Any]]) -> bool:
+    return {"time", "lat", "lon"} <= {read_name(str(cell), FIXES).quantity for cell in rows[0]}
+
+
+def _named_by(title: str, name: str) -> str:
+    """Return the name of a column, with that of its sheet before it if it says no quantity."""
+    return name if read_name(name).quantity else f"{title} {name}"
+
+
+def _of_sheet(path: Path, title: str, rows: list[list[Any]]) -> RawLog:
     buffer = io.StringIO()
-    width = max(len(row) for row in sheets[name])
+    width = max(len(row) for row in rows)
     writer = text_csv.writer(buffer, lineterminator="\n")
-    for row in sheets[name]:
+    for row in rows:
         writer.writerow([_text_of_excel(cell) for cell in [*row, *[None] * (width - len(row))]])
-    raw = with_force_summed(csv.parse(buffer.getvalue().encode(), path.name, (path,)))
-    if len(sheets) > 1:
-        others = [n for n in sheets if n != name]
-        add_note(raw.findings, "io.sheet-read", file=path.name, name=name, others=others)
+    raw = csv.parse(buffer.getvalue().encode(), path.name, (path,))
+    if len(_sensors_of(title, rows)) == 1:
+        raw.columns = {_named_by(title, n): values for n, values in raw.columns.items()}
+        raw.units = {_named_by(title, n): unit for n, unit in raw.units.items()}
+        raw.name = f"{path.name}/{title}"
     return raw
 
 
@@ -258,13 +296,24 @@ def read_json_table(path: Path) -> RawLog:
 
 
 def read_json_fixes(path: Path) -> RawLog:
-    """Read the object of fixes of an object of sensors; the whole table of any other file."""
+    """Read the object of fixes of an object of sensors; the table of any other file.
+
+    Objects without a position, as reports of a receiver of another kind, are left out.
+    """
     if _form(head(path).lstrip()) in ("member", "nested"):
         for name, columns in _sensors_apart(_unwrapped(from_json(path))).items():
             if {"lat", "lon"} <= {read_name(n, FIXES).quantity for n in columns}:
                 arrays = {n: _array_of(values) for n, values in columns.items()}
                 return RawLog(f"{path.name}/{name}", (path,), arrays)
-    return read_json_table(path)
+    raw = read_json_table(path)
+    place = [c for n, c in raw.columns.items() if read_name(n, FIXES).quantity in ("lat", "lon")]
+    if len(place) != 2 or any(c.dtype.kind != "f" for c in place):
+        return raw
+    there = np.isfinite(place[0]) & np.isfinite(place[1])
+    if there.all() or not there.any():
+        return raw
+    raw.note("io.fixes-without-position-left-out", count=int((~there).sum()))
+    return selected(raw, there)
 
 
 def _by_columns(path: Path) -> RawLog:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats.arrays import is_stamp
+from strapdown.formats.vocabularies import FOREIGN, without_accents
 from strapdown.tables import on_disk
 
 Columns = list[NDArray[Any]]
@@ -79,9 +80,25 @@ def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
     try:
         return without_second_encoding(data.decode("utf-8-sig"), name)
     except UnicodeDecodeError as error:
-        return data.decode("cp1252", "replace"), [
-            Finding("io.not-utf-8", file=name, severity="note", byte=error.start)
+        code = _code_of(top)
+        about: dict[str, Any] = {"byte": error.start, "encoding": _CODES[code]}
+        return data.decode(code, "replace"), [
+            Finding("io.not-utf-8", file=name, severity="note", **about)
         ]
+
+
+#: Codes of texts before Unicode, and how they are called. The first holds any text.
+_CODES = {"cp1252": "Windows-1252", "cp1251": "Windows-1251", "gb18030": "GB 18030"}
+_CODES |= {"shift_jis": "Shift JIS", "cp949": "CP949"}
+
+
+def _code_of(top: bytes) -> str:
+    """Return the code in which most words of clocks and sensors are found, of any language."""
+    found = {}
+    for code in _CODES:
+        text = without_accents(top.decode(code, "ignore").lower())
+        found[code] = sum(word in text for word in FOREIGN)
+    return max(found, key=lambda code: found[code])  # the first of equals
 
 
 #: Codes in which programs read UTF-8 by mistake.

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -21,6 +22,12 @@ from strapdown.units import (
     SPEEDS,
     TIME_UNITS,
 )
+
+
+def without_accents(text: str) -> str:
+    """Return the letters of a text without their accents."""
+    bare = "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
+    return unicodedata.normalize("NFC", bare)  # the syllables of Korean are whole again
 
 
 @dataclass(frozen=True)
@@ -87,7 +94,7 @@ ABROAD = {
         "гироскоп 角速度 陀螺 ジャイロ 각속도 자이로",
         "magnetometer": "magnetfeld magnetometr магнит 磁 지자기 자기장",
         "velocity": "geschwindigkeit vitesse velocidad velocita predkosc скорость",
-        "angular": "angulaire angolar katow угловая",
+        "angular": "angulaire angolar katow угл",
         "linear": "linear lineaire lineal",
         "without": "ohne sans senza",
         "roll": "wank roulis alabeo rollio",
@@ -95,6 +102,8 @@ ABROAD = {
         "yaw": "gier lacet guinada imbardata",
     }.items()
 }
+#: Those in other letters, by which the code of a text is known.
+FOREIGN = {w for stems in ABROAD.values() for w in stems if not w.isascii()}
 #: Axis of the body that a turn is about.
 TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
 #: Words for the axes of a vehicle.
@@ -152,7 +161,9 @@ APPLE = ("timeintervalsince1970",)
 #: Words of the name of a clock, beside ``time``, and words behind it in brackets.
 OF_TIME = {
     *_words("time timestamp timestamps stamp unix epoch utc gps system gmt sample logging elapsed"),
-    *_words("since start boot reboot local ros rosbag bag header rtc chip device lsl"),
+    *_words(
+        "since since1970 start startup boot reboot local ros rosbag bag header rtc chip device lsl"
+    ),
 }
 TIME = Quantity((*TIMES, *CLOCKS), TIME_UNITS)
 #: Of tables of measurements, where a date is a clock.
@@ -228,6 +239,7 @@ NOISE = {
     *("raw", "imu", "sensor", "sensors", "data", "body", "device", "phone", "watch", "motion"),
     *("cal", "calib", "calibrated", "corrected", "meas", "measured", "value", "values", "axis"),
     *("ins", "the", "of", "in", "de", "del", "di", "reading", "readings", "uncal", "uncalibrated"),
+    *("unbiased",),
     # Of flight controllers: converted, smoothed (gyroADC, accSmooth).
     *("adc", "smooth", "filt", "filtered", "lpf", "lowpass", "out", "scaled", "total", "inertial"),
     *("uncomp", "uncompensated", "comp", "compensated", "ch", "channel", "sens", "mpu", "type"),
@@ -338,8 +350,8 @@ _GEODETIC: dict[str, Quantity] = {
     "alt": Quantity(
         _words(
             "alt altitude h hgt height hell altell heightell ellipsoidalheight heightellipsoid "
-            "altitudeellipsoid ellipsoidheight ellheight heightwgs84 altitudewgs84 "
-            "altellipsoid hae höhe hohe hoehe altitud altura altitudine quota hoogte высота "
+            "ellipsoidheight ellheight heightwgs84 altitudewgs84 "
+            "hae höhe hohe hoehe altitud altura altitudine quota hoogte высота "
             "高度 고도 wysokość wysokosc"
         ),
         LENGTHS,
@@ -397,7 +409,9 @@ FIXES = Vocabulary(
             LENGTHS,
         ),
         # It counts beside other heights.
-        "alt_hae": Quantity(_words("althae altitudehae heighthae"), LENGTHS),
+        "alt_hae": Quantity(
+            _words("althae altitudehae heighthae altellipsoid altitudeellipsoid"), LENGTHS
+        ),
         "geoid": Quantity(
             _words("geoid undulation geoidsep geoidseparation geoidheight geoidundulation"), LENGTHS
         ),
@@ -409,7 +423,7 @@ FIXES = Vocabulary(
             LENGTHS,
         ),
         # Of formats, and a word, that do not say whether it is over the ellipsoid or over the sea.
-        "alt_unstated": Quantity(_words("elevation elev ele"), LENGTHS),
+        "alt_unstated": Quantity(_words("elevation elev ele enhancedaltitude"), LENGTHS),
         "north": Quantity(
             _words("north posn positionnorth northposition northing northings utmn utmnorthing"),
             LENGTHS,
@@ -455,7 +469,7 @@ FIXES = Vocabulary(
             _words(
                 "speed sog gspeed groundspeed locationspeed speedoverground gndspd spd "
                 "geschwindigkeit vitesse velocidad velocità velocita snelheid hastighet prędkość "
-                "predkosc rychlost brzina rapidez скорость 速度 车速 航速 속도"
+                "enhancedspeed predkosc rychlost brzina rapidez скорость 速度 车速 航速 속도"
             ),
             SPEEDS,
         ),

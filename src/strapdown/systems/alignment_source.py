@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,14 +11,15 @@ import numpy as np
 import pandas as pd
 
 from strapdown.bundle import InputFiles, input_files, log_files, sensor_file
-from strapdown.config.logs import AxesTable, LogTable
+from strapdown.config.logs import AxesTable, LogTable, with_answers
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.errors import Finding
+from strapdown.errors import Finding, StrapdownError
 from strapdown.formats import files_of, read_log
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
-from strapdown.formats.recording import Reading, Recording, StatedStart
+from strapdown.formats.recording import PLACEHOLDERS, Reading, Recording, StatedStart
+from strapdown.navigation.measurements.gnss_course import unit_of_turns
 from strapdown.rotation import euler_from_dcm
 from strapdown.sensors.triad_errors import (
     NAMED_AXES,
@@ -117,6 +118,34 @@ def body_record(
             findings += report_transposed(accel, force, recording.name)
     part = part_of_log(imu, log.from_s, log.to_s, log.duration_s, recording.name)
     return recording, part, tuple(findings)
+
+
+def gyro_unit_by_turns(
+    log: LogTable,
+    axes: AxesTable,
+    refused: Finding,
+    fixes_of: Callable[[Recording], pd.DataFrame],
+) -> Finding | None:
+    """Answer the unit of a gyro that a log leaves open by the turns of fixes.
+
+    None if the log leaves open anything else without an answer, or the turns do not show the unit.
+
+    Parameters
+    ----------
+    refused : Finding
+        The refusal to read the log.
+    fixes_of : callable
+        Returns the fixes on the clock of the recording.
+    """
+    answers = dict(refused.data.get("answers", ()))
+    if [q for q, answer in answers.items() if answer in PLACEHOLDERS] != ["gyro_unit"]:
+        return None
+    try:
+        tried = with_answers(log, {**answers, "gyro_unit": "rad/s"})
+        recording, imu, _ = body_record(tried, axes)
+        return unit_of_turns(fixes_of(recording), imu)
+    except StrapdownError:
+        return None
 
 
 def axes_matrices(axes: AxesTable) -> tuple[Array | None, Array | None]:

@@ -22,6 +22,7 @@ from strapdown.config.logs import (
     LogTable,
     flags_of,
     flags_of_fixes,
+    with_answers,
 )
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.samples import running_integral, white_sd
@@ -69,7 +70,7 @@ from strapdown.sensors.rest import (
     rest_between,
 )
 from strapdown.sensors.sampling_health import check_sampling, quantization_step
-from strapdown.systems.alignment_source import body_record
+from strapdown.systems.alignment_source import body_record, gyro_unit_by_turns
 from strapdown.systems.inputs import Memory, SavedRun
 from strapdown.systems.navigation_checks import longest_faults, most_unusable, unusable_samples
 from strapdown.systems.navigation_proposal import (
@@ -254,6 +255,11 @@ def run_doctor(spec: DoctorSpec, progress: Progress = silent) -> Diagnosis:
     # The positions of a reference are fixes where there are no others.
     alone.sort(key=lambda k: "reference" in logs[k].streams)
     for k, one in enumerate(logs):
+        asked = () if one.refused is None else one.refused.data.get("answers", ())
+        if alone and "imu" not in one.streams and ("gyro_unit", "UNIT") in asked:
+            at = next(j for j, log in enumerate(spec.logs) if log.path == one.log.path)
+            gnss = logs[alone[0]].streams["gnss"]
+            one = logs[k] = _diagnose(spec.logs[at], spec.axes_of(at), None, gnss)
         if alone and "imu" in one.streams and "gnss" not in one.streams:
             fixes = logs[alone[0]]
             logs[k] = _with_fixes(one, fixes)
@@ -275,9 +281,14 @@ def _files(one: LogDiagnosis) -> tuple[Path, ...]:
     return tuple(sorted(files))
 
 
-def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogDiagnosis:
+def _diagnose(
+    log: LogTable,
+    axes: str | None,
+    fixes: FixesTable | None,
+    gnss: pd.DataFrame | None = None,
+) -> LogDiagnosis:
     form, reader = _reader(log)
-    inertial = _inertial(log, axes)
+    inertial = _inertial(log, axes, gnss)
     streams = {} if inertial.imu is None else {"imu": inertial.imu}
     findings = list(inertial.findings)
     others, found = _others(log, reader, inertial.recording, fixes)
@@ -415,8 +426,11 @@ class _Inertial:
     refused: Finding | None
 
 
-def _inertial(log: LogTable, axes: str | None) -> _Inertial:
-    """Read inertial samples; open questions are answered as inferred, and listed."""
+def _inertial(log: LogTable, axes: str | None, gnss: pd.DataFrame | None = None) -> _Inertial:
+    """Read inertial samples; open questions are answered as inferred, and listed.
+
+    `gnss`: fixes whose turns may answer the unit of a gyro.
+    """
     questions: list[Finding] = []
     answers: dict[str, str] = {}
     refused = None
@@ -429,21 +443,25 @@ def _inertial(log: LogTable, axes: str | None) -> _Inertial:
         if "answers" not in refused.data:
             break
         asked = refused.data["questions"] if refused.code == "io.questions" else [refused]
-        questions += [one for one in asked if one not in questions]
         new = {q: a for q, a in refused.data["answers"] if answers.get(q) != a}
+        if gnss is not None and (unit := _by_turns(log, axes, refused, gnss)):
+            asked = [unit if one.quantity == "gyro" else one for one in asked]
+            new["gyro_unit"] = str(unit.data["unit"])
+        questions += [one for one in asked if one not in questions]
         if not new or PLACEHOLDERS & set(new.values()):
             break
         answers |= new
-        log = _answered(log, new)
+        log = with_answers(log, new)
     return _Inertial(log, None, None, (), tuple(questions), answers, refused)
 
 
-def _answered(log: LogTable, answers: Mapping[str, str]) -> LogTable:
-    keys = LogTable.model_fields
-    columns = log.columns | {q: c for q, c in answers.items() if q not in keys}
-    stated: dict[str, Any] = {q: a for q, a in answers.items() if q in keys}
-    stated |= {"repair": True} if "repair" in answers else {}
-    return log.model_copy(update={**stated, "columns": columns})
+def _by_turns(
+    log: LogTable, axes: str | None, refused: Finding, gnss: pd.DataFrame
+) -> Finding | None:
+    def fixes_of(recording: Recording) -> pd.DataFrame:
+        return on_clock_of(gnss, recording.imu)[0]
+
+    return gyro_unit_by_turns(log, AxesTable(axes=axes), refused, fixes_of)
 
 
 def _others(

@@ -23,7 +23,7 @@ from strapdown.errors import DataError, DivergenceError, Finding
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import open_fixes, read_gnss
-from strapdown.formats.recording import Recording
+from strapdown.formats.recording import Recording, as_stated
 from strapdown.frames import ways_between
 from strapdown.navigation.measurements.clock_windows import (
     ClockStep,
@@ -58,7 +58,7 @@ from strapdown.sensors.uncertainty import (
     TriadUncertainty,
     stated_imu,
 )
-from strapdown.systems.alignment_source import body_record
+from strapdown.systems.alignment_source import body_record, gyro_unit_by_turns
 from strapdown.systems.navigation_checks import ARM_SD
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
@@ -243,7 +243,10 @@ def propose(
         Called with a stage and the share that is done.
     """
     progress("reading", 0.1)
-    recording, imu, findings = body_record(log, AxesTable(axes=axes))
+    try:
+        recording, imu, findings = body_record(log, AxesTable(axes=axes))
+    except DataError as error:
+        raise _answered_by_turns(error, log, axes, gnss) from None
     require_accel(recording)
     table: dict[str, Any] = {"log": log.model_dump(exclude_none=True), "axes": {"axes": axes}}
     fixes = None
@@ -251,12 +254,7 @@ def propose(
     if opened is not None:
         gnss = FixesTable(path=log.path)
     if gnss is not None:
-        asked = replace(
-            gnss.options(),
-            unstated_position_sd=CODE_POSITION_SD,
-            unstated_velocity_sd=CODE_VELOCITY_SD,
-        )
-        fixes, shifted = on_clock_of(read_gnss(gnss.path, asked, opened), recording.imu)
+        fixes, shifted = _fixes(gnss, opened, recording)
         findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))
         fixes, repeats = without_repeats(fixes)
         findings = (*findings, *repeats)
@@ -347,6 +345,47 @@ def propose(
             }
         }
     return Proposal(table, recording, imu, fixes, rest, noise, guessed, drives, how, findings)
+
+
+def _fixes(
+    gnss: FixesTable, opened: Any, recording: Recording
+) -> tuple[pd.DataFrame, Finding | None]:
+    """Read fixes onto the clock of a log, with the errors of a code receiver where none are stated.
+
+    `opened`: as of `read_gnss`.
+    """
+    asked = replace(
+        gnss.options(),
+        unstated_position_sd=CODE_POSITION_SD,
+        unstated_velocity_sd=CODE_VELOCITY_SD,
+    )
+    return on_clock_of(read_gnss(gnss.path, asked, opened), recording.imu)
+
+
+def _answered_by_turns(
+    error: DataError, log: LogTable, axes: str | None, gnss: FixesTable | None
+) -> DataError:
+    """Answer the unit of the gyro, where the log leaves it open, by the turns of the fixes.
+
+    Returns the same error if the turns do not show it.
+    """
+
+    def fixes_of(recording: Recording) -> pd.DataFrame:
+        opened = open_fixes(log.path) if gnss is None else None
+        return _fixes(gnss or FixesTable(path=log.path), opened, recording)[0]
+
+    refused = error.finding
+    unit = gyro_unit_by_turns(log, AxesTable(axes=axes), refused, fixes_of)
+    if unit is None:
+        return error
+    said = as_stated({**dict(refused.data["answers"]), "gyro_unit": str(unit.data["unit"])})
+    questions = refused.data.get("questions") or (refused,)
+    asked = tuple(unit if one.quantity == "gyro" else one for one in questions)
+    return (
+        DataError(unit, **said)
+        if len(asked) == 1
+        else DataError(error.finding, **said, questions=asked)
+    )
 
 
 def _stated(table: dict[str, Any]) -> ImuUncertainty:

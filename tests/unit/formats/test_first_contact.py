@@ -9,6 +9,8 @@ from __future__ import annotations
 import json
 import zlib
 from datetime import UTC, datetime, timedelta
+from functools import reduce
+from operator import xor
 
 import numpy as np
 import pandas as pd
@@ -414,14 +416,16 @@ def test_an_order_that_nothing_shows_is_not_proposed_as_known(tmp_path):
 # Formats with a head of their own.
 
 
-def test_vbo_of_racelogic(tmp_path):
+@pytest.mark.parametrize("hour", [8, 23])
+def test_vbo_of_racelogic(tmp_path, hour):
     """Minutes of an arc, longitude to the west, km/h, UTC of the day, on the date of the head."""
     top = "File created on 05/03/2024 at 14:00:00\n\n[header]\nsatellites\ntime\nvelocity kmh\n\n"
     top += "[channel units]\n\n[comments]\n(c) Racelogic\n\n[column names]\n"
     top += "sats time lat long velocity heading height\n\n[data]"
     rows = top.split("\n")
+    begin = DAY.replace(hour=hour, minute=59, second=50)
     for k in range(60):
-        at = DAY.replace(hour=23, minute=59, second=50) + timedelta(seconds=k / 2)
+        at = begin + timedelta(seconds=k / 2)
         sats = 0 if k == 3 else 73  # 9, and 64 for a differential fix
         place = f"{60 * LAT[k]:+012.6f} {-60 * LON[k]:+012.6f}"
         stamp = f"{at:%H%M%S}.{at.microsecond // 10000:02d}"
@@ -437,8 +441,8 @@ def test_vbo_of_racelogic(tmp_path):
     np.testing.assert_allclose(fixes[["VN", "VE"]], np.tile([0.0, 10.0], (59, 1)), atol=1e-9)
     assert set(fixes["quality"]) == {2.0}
     # The last row of the day is followed by the next day.
-    since = fixes.index + fixes.attrs["clock_origin"] - DAY.timestamp()
-    np.testing.assert_allclose(since, 12 * 3600 - 10 + np.arange(60)[keep] / 2, atol=1e-6)
+    since = fixes.index + fixes.attrs["clock_origin"] - begin.timestamp()
+    np.testing.assert_allclose(since, np.arange(60)[keep] / 2, atol=1e-6)
 
 
 FLYS = ["$FLYS,1", "$VAR,FIRMWARE_VER,v2023.09.22"]
@@ -717,3 +721,219 @@ def test_right_names_are_not_decoded_again(tmp_path):
     imu = sd.read_imu(tabled(tmp_path, names, [T, RATE * DEG, FORCE]))
     check(imu, digits=2e-4)
     assert "io.text-decoded-twice" not in {f.code for f in imu.findings}
+
+
+# Programs that write one sensor a sheet, letters of other codes, and clocks and names of their own.
+
+
+def test_sheets_of_single_sensors_are_one_log(tmp_path):
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    axes = [f"{a} (rad/s)" for a in "xyz"]
+    later = np.vstack([FORCE, FORCE[-1]])
+    for title, names, values in (
+        ("Gyroscope", axes, RATE),
+        ("Accelerometer", [f"Acceleration {a} (m/s^2)" for a in "xyz"], later),
+        ("Linear", [f"Linear Acceleration {a} (m/s^2)" for a in "xyz"], 0 * later),
+    ):
+        sheet = book.create_sheet(title)
+        sheet.append(["Time (s)", *names])
+        for row in np.column_stack([STEP * np.arange(len(values)), values]).tolist():
+            sheet.append(row)
+    sheet = book.create_sheet("Location")
+    sheet.append(["Time (s)", "Latitude (°)", "Longitude (°)", "Height over ellipsoid (m)"])
+    for k in range(14):
+        sheet.append([float(k), LAT[k], LON[k], 100.0])
+    book.create_sheet("Metadata").append(["deviceModel", "x"])
+    path = tmp_path / "raw.xlsx"
+    book.save(path)
+    imu = sd.read_imu(path)
+    check(imu)
+    told = next(f for f in imu.findings if f.code == "io.sheet-read")
+    assert told.data["names"] == ("Gyroscope", "Accelerometer", "Location")
+    assert told.data["others"] == ("Linear", "Metadata")
+    fixes = sd.read_gnss(path, position_sd_m=3.0, columns={"alt": "4"})
+    np.testing.assert_allclose(fixes[["lat", "lon"]], np.column_stack([LAT, LON])[:14], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "title", "time", "gyro", "accel"),
+    [
+        ("gb18030", "GB 18030", "时间(s)", "角速度{}(°/s)", "加速度{}(g)"),
+        ("cp1251", "Windows-1251", "Время, с", "Угл. скорость {}, град/с", "Ускорение {}, g"),
+        ("cp1252", "Windows-1252", "Zeit [s]", "Drehrate {} [°/s]", "Beschl {} [g]"),
+    ],
+)
+def test_codes_of_texts_before_unicode(tmp_path, encoding, title, time, gyro, accel):
+    names = [time, *(gyro.format(a) for a in "XYZ"), *(accel.format(a) for a in "XYZ")]
+    lines = [";".join(names)]
+    for t, row in zip(T, np.column_stack([RATE * DEG, FORCE / STANDARD_GRAVITY]), strict=True):
+        lines.append(line(f"{t:.3f}", *many(row), separator=";"))
+    path = tmp_path / "log.csv"
+    path.write_bytes("\n".join([*lines, ""]).encode(encoding))
+    imu = sd.read_imu(path)
+    check(imu)
+    assert next(f for f in imu.findings if f.code == "io.not-utf-8").data["encoding"] == title
+
+
+def test_a_counter_of_microseconds_that_is_written_in_ms_wraps(tmp_path):
+    ms = (2**32 - 5_000_000 + np.arange(N) * 10_000) % 2**32 / 1e3
+    path = tabled(
+        tmp_path, ["time_ms", *of("gyro", "_rads"), *of("acc", "_mss")], [ms, RATE, FORCE]
+    )
+    with pytest.raises(DataError, check=coded("io.time-counter-wraps", bits=32)):
+        sd.read_imu(path)
+    check(sd.read_imu(path, repair=True))
+
+
+def test_a_report_of_a_receiver_beside_its_positions(tmp_path):
+    """As of gpsd: objects of another class have neither a time nor a position."""
+    lines = []
+    for k in range(20):
+        at = f"{DAY + timedelta(seconds=k):%Y-%m-%dT%H:%M:%S.000Z}"
+        fix = {"class": "TPV", "time": at, "lat": LAT[k], "lon": LON[k], "altHAE": 100.0 + k}
+        lines += [json.dumps(fix), json.dumps({"class": "SKY", "hdop": 0.8})]
+    fixes = sd.read_gnss(written(tmp_path, "gpsd.json", lines), position_sd_m=3.0)
+    np.testing.assert_allclose(fixes[["lat", "lon"]], np.column_stack([LAT, LON])[:20], atol=1e-12)
+    np.testing.assert_allclose(np.diff(fixes.index), 1.0)
+
+
+@pytest.mark.parametrize("form", ["{}", "NMEA,{},1709640000123", "[2024-03-05 12:00:00.1] {}"])
+def test_sentences_between_stamps_of_a_program(tmp_path, form):
+    lines = []
+    for k in range(5):
+        body = f"GNGGA,12000{k}.00,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,"
+        lines.append(form.format(f"${body}*{reduce(xor, body.encode()):02X}"))
+    fixes = sd.read_gnss(written(tmp_path, "nmea.txt", lines), position_sd_m=3.0)
+    assert len(fixes) == 5
+    np.testing.assert_allclose(fixes[["lat", "lon"]].iloc[0], [48 + 7.038 / 60, 11 + 31 / 60])
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "unit"),
+    [
+        ("field.latitude", "lat", None),
+        ("OSD.altitude [m]", "alt", "m"),
+        ("locationLatitude(WGS84)", "lat", None),
+        ("Alt (HAE)", "alt_hae", None),
+        ("Alt (MSL)", "alt_msl", None),
+        ("Alt (bananas)", "alt", "bananas"),
+        ("alt_ellipsoid", "alt_hae", None),
+        ("Time (GPS s)", "time", "s"),
+        ("locationTimestamp_since1970(s)", "time", "s"),
+        ("position_long(semicircles)", "lon", "semicircles"),
+        ("orientation.x", None, None),
+    ],
+)
+def test_names_of_fixes_as_programs_write_them(name, quantity, unit):
+    said = read_name(name, FIXES)
+    assert (said.quantity, said.unit) == (quantity, unit)
+
+
+def test_semicircles(tmp_path):
+    lines = ["time_s,lat (semicircles),lon (semicircles),alt_hae"]
+    for k in range(9):
+        lines.append(f"{k},{LAT[k] * 2**31 / 180:.0f},{LON[k] * 2**31 / 180:.0f},100")
+    fixes = sd.read_gnss(written(tmp_path, "fit.csv", lines), position_sd_m=3.0)
+    # Half a unit.
+    np.testing.assert_allclose(fixes[["lat", "lon"]], np.column_stack([LAT, LON])[:9], atol=4.2e-8)
+
+
+@pytest.mark.parametrize("name", ["acc_{} (m/s2)", "G({})"])
+def test_an_accelerometer_alone_is_the_reason(tmp_path, name):
+    force = FORCE / (STANDARD_GRAVITY if name[0] == "G" else 1.0)
+    more = ["time_s", *(name.format(a) for a in "xyz"), *(["G(calibrated)"] * (name[0] == "G"))]
+    path = tabled(tmp_path, more, [T, force, *([0 * T] * (name[0] == "G"))])
+    names = tuple(name.format(a) for a in "xyz")
+    with pytest.raises(DataError, check=coded("io.accelerometer-alone", names=names)):
+        sd.read_imu(path)
+
+
+def test_rates_of_the_letter_g_alone_are_rates(tmp_path):
+    path = tabled(tmp_path, ["time_s", *of("g")], [T, 3.0 * RATE])
+    np.testing.assert_allclose(
+        sd.read_imu(path, units={"gyro": "rad/s"})[GYRO], 3 * RATE, atol=1e-5
+    )
+
+
+def test_angles_that_go_on_are_proposed_as_no_clock(tmp_path):
+    turn = np.column_stack([T, 0 * T, 0 * T])
+    names = [*(f"Orientation {a}" for a in "xyz"), *of("gyro", "_rads"), *of("acc", "_mss")]
+    with pytest.raises(DataError, check=coded("io.time-column-missing")) as refused:
+        sd.read_imu(tabled(tmp_path, names, [turn, RATE, FORCE]))
+    assert refused.value.finding.data["flags"] == "--rate HZ"
+
+
+def test_stamps_behind_a_blank(tmp_path):
+    lines = ["Time(s)\t" + "\t".join([*of("w", "(deg/s)"), *of("a", "(g)")])]
+    for t, row in zip(T, np.column_stack([RATE * DEG, FORCE / STANDARD_GRAVITY]), strict=True):
+        stamp = f" {DAY + timedelta(seconds=t):%H:%M:%S.%f}"[:-3]
+        lines.append(line(stamp, *many(row), separator="\t"))
+    check(sd.read_imu(written(tmp_path, "wit.txt", lines)))
+
+
+def test_a_stamp_before_a_colon_and_numbers_of_numpy(tmp_path):
+    """As of mavlogdump, and of a dictionary that Python prints."""
+    lines = []
+    for t, w, f in zip(T, RATE, FORCE, strict=True):
+        said = " ".join(f"Gyr{a} : {v:.6f}," for a, v in zip("XYZ", w, strict=True))
+        said += " ".join(f" Acc{a} : {v:.6f}," for a, v in zip("XYZ", f, strict=True))
+        lines.append(f"2024-03-05 12:00:00.00: IMU {{TimeUS : {1e6 + 1e6 * t:.0f}, {said} T : 35}}")
+    check(sd.read_imu(written(tmp_path, "dump.txt", lines)))
+    lines = []
+    for t, w, f in zip(T, RATE, FORCE, strict=True):
+        acc, gyro = (", ".join(f"np.float64({v:.6f})" for v in three) for three in (f, w))
+        lines.append(f"{{'t': {t:.2f}, 'acc': ({acc}), 'gyro': ({gyro})}}")
+    check(sd.read_imu(written(tmp_path, "print.txt", lines)))
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "unit"),
+    [
+        ("Gyro-X (d/s)", "gyro_x", "deg/s"),
+        ("ax_ftps2", "accel_x", "ft/s2"),
+        ("rotationRateUnbiased.x", "gyro_x", None),
+        ("TimeStartup", "time", None),
+        ("head_d_s", None, "s"),
+        ("Angular velocity X in degrees per second", "gyro_x", "deg/s"),
+        ("Acceleration X (meters per second squared)", "accel_x", "m/s2"),
+    ],
+)
+def test_further_names_of_columns(name, quantity, unit):
+    said = read_name(name)
+    assert (said.quantity, said.unit) == (quantity, unit)
+
+
+def test_a_part_of_a_second_beside_a_time_of_day_before_noon(tmp_path):
+    lines = [",".join(["Date", "Time", "ms", *of("gyro", " (deg/s)"), *of("acc", " (g)")])]
+    begin = DAY.replace(hour=9) + timedelta(milliseconds=123)
+    for t, row in zip(T, np.column_stack([RATE * DEG, FORCE / STANDARD_GRAVITY]), strict=True):
+        at = begin + timedelta(seconds=t)
+        stamp = f"{at:%Y-%m-%d},{at:%I:%M:%S %p},{round(at.microsecond / 1e3)}"
+        lines.append(line(stamp, *many(row)))
+    imu = sd.read_imu(written(tmp_path, "log.csv", lines))
+    check(imu)
+    assert imu.attrs["clock_origin"] == pytest.approx(begin.timestamp(), abs=1e-6)
+
+
+def test_a_repair_that_loses_most_of_a_log_is_not_proposed(tmp_path):
+    """Stamps that begin anew each second go back 14 times, and few are later than all before."""
+    cycle = np.round(1e3 * T) % 1000
+    path = tabled(
+        tmp_path, ["time_ms", *of("gyro", "_rads"), *of("acc", "_mss")], [cycle, RATE, FORCE]
+    )
+    with pytest.raises(DataError, check=coded("io.time-goes-back", count=14)) as refused:
+        sd.read_imu(path)
+    assert "flags" not in refused.value.finding.data or "repair" not in str(
+        refused.value.finding.data["flags"]
+    )
+    assert refused.value.finding.data["lost"] == N - 100
+
+
+@pytest.mark.parametrize("name", ["body spin rate {}", "gyrX{}", "omega {} of it"])
+def test_names_that_may_be_of_rates_are_listed(tmp_path, name):
+    names = ["time_s", *of("acc", "_mss"), *(name.format(a) for a in "abc")]
+    with pytest.raises(DataError, check=coded("io.no-gyro-columns")):
+        sd.read_imu(tabled(tmp_path, names, [T, FORCE, RATE]))

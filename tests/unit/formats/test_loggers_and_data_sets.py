@@ -395,6 +395,15 @@ def test_racechrono_takes_sensors_apart(tmp_path):
     truncations(path, tmp_path, "gnss")
 
 
+def test_racechrono_of_another_receiver_is_not_called_a_log_of_sensors(tmp_path):
+    lines = [RACE.replace("100: gps", "200: obd").replace("102: gyro", "300: can").rstrip()]
+    lines += [f"{1.7e9 + k:.3f},1,4,200,90.0,47.0,9.5,20.0,20.1,,,,1.0,2.0,3.0" for k in range(9)]
+    path = written(tmp_path / "session.csv", lines)
+    for stream in ("gnss", "imu"):
+        with pytest.raises(DataError, check=coded("io.no-known-stream")):
+            open_stream(path, stream)
+
+
 def test_doubled_rows_of_an_x_imu3(recordings):
     path = recordings("zoo/xio/short_walk.csv")
     table = pd.read_csv(path).drop_duplicates()
@@ -858,7 +867,7 @@ def test_the_sheet_with_the_most_numbers(tmp_path):
     np.testing.assert_allclose(recording.imu[GYRO].to_numpy(), RATE, rtol=1e-15, atol=1e-15)
     np.testing.assert_allclose(recording.imu[ACCEL].to_numpy(), FORCE, rtol=1e-15, atol=1e-15)
     told = next(f for f in recording.findings if f.code == "io.sheet-read")
-    assert told.data["name"] == "Data" and told.data["others"] == ("Notes",)
+    assert told.data["names"] == ("Data",) and told.data["others"] == ("Notes",)
     truncations(path, tmp_path, "imu", 8)
 
 

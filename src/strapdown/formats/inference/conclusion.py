@@ -280,8 +280,8 @@ def infer_time_faults(steps: Steps) -> Inference:
         faults.append("constant stamps")
     else:
         back = np.flatnonzero(steps.steps < 0) if forward.size < steps.steps.size else ()
-        bits = [wrap_bits(float(stamps[k]), float(steps.steps[k]), usual) for k in back]
-        wrapped = [b for b in bits if b]
+        wraps = [wrap_of(float(stamps[k]), float(steps.steps[k]), usual) for k in back]
+        wrapped = [wrap[0] for wrap in wraps if wrap]
         if repeated := steps.steps.size - forward.size - len(back):
             faults.append(f"{repeated} repeated")
         if wrapped:
@@ -303,11 +303,15 @@ def infer_time_faults(steps: Steps) -> Inference:
     )
 
 
-def wrap_bits(before: float, step: float, usual: float) -> int | None:
-    """Return the width of the counter that wrapped in this step, or None."""
-    for bits in COUNTER_BITS:
-        if 0.0 < step + 2.0**bits <= 50.0 * usual and 0 <= before < 2.0**bits:
-            return bits
+def wrap_of(before: float, step: float, usual: float) -> tuple[int, float] | None:
+    """Return the width and the period of the counter that wrapped in this step, or None.
+
+    Programs write a counter of 32 bits in microseconds in ms or s, too.
+    """
+    periods = [(bits, 2.0**bits) for bits in COUNTER_BITS]
+    for bits, period in (*periods, (32, 2.0**32 * 1e-3), (32, 2.0**32 * 1e-6)):
+        if 0.0 < step + period <= 50.0 * usual and 0 <= before < period:
+            return bits, period
     return None
 
 

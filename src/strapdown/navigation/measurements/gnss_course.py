@@ -319,6 +319,37 @@ def check_forward(
     return [Finding("navigation.forward-axis-elsewhere", data=data, **where)]
 
 
+def _is_about(ratio: float, factor: float) -> bool:
+    return factor / ABOUT < ratio < factor * ABOUT
+
+
+def unit_of_turns(gnss: pd.DataFrame, imu: pd.DataFrame) -> Finding | None:
+    """Return the unit, of rad/s and deg/s, in which gyros turn as the course does.
+
+    None if the course does not show it.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Its rates are read as rad/s.
+    """
+    found = turn_ratio(gnss, imu)
+    for unit, factor in (("rad/s", 1.0), ("deg/s", DEGREES)):
+        if found is not None and _is_about(found.ratio, factor):
+            return Finding(
+                "navigation.gyro-unit-by-course",
+                file=source_of(imu),
+                quantity="gyro",
+                unit=unit,
+                fixes=source_of(gnss),
+                ratio=found.ratio / factor,
+                sd=found.sd / factor,
+                windows=found.windows,
+                share=found.share,
+            )
+    return None
+
+
 def check_turns(
     gnss: pd.DataFrame, imu: pd.DataFrame, velocity_delay: float = 0.0
 ) -> list[Finding]:
@@ -345,7 +376,7 @@ def check_turns(
         "windows": found.windows,
     }
     for unit, factor in (("deg/s", DEGREES), ("rad/s", 1.0 / DEGREES)):
-        if factor / ABOUT < found.ratio < factor * ABOUT:
+        if _is_about(found.ratio, factor):
             raise DataError("navigation.course-shows-gyro-unit", unit=unit, **facts)
     code = "navigation.course-turns-opposite" if found.ratio < 0.0 else "navigation.course-turns"
     return [Finding(code, **facts)]

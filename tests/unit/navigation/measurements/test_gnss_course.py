@@ -3,11 +3,18 @@
 import numpy as np
 import pandas as pd
 import pytest
+from tests.coded import coded
 
 import strapdown as sd
+from strapdown.config.logs import FixesTable, LogTable, with_answers
 from strapdown.errors import DataError
-from strapdown.navigation.measurements.gnss_course import check_turns, turn_ratio
+from strapdown.navigation.measurements.gnss_course import (
+    check_turns,
+    turn_ratio,
+    unit_of_turns,
+)
 from strapdown.simulation.gnss import GnssReceiver
+from strapdown.systems.navigation_proposal import propose
 from strapdown.tables import ACCEL, GYRO
 
 DEGREES = 180.0 / np.pi
@@ -48,6 +55,45 @@ def test_positions_alone_at_a_high_rate_suffice():
     fixes, imu = drive(10.0, place_noise=0.2)
     found = turn_ratio(without_velocities(fixes), imu)
     assert abs(found.ratio - 1.0) < 5.0 * found.sd < 0.5
+
+
+@pytest.mark.parametrize(("by", "unit"), [(1.0, "rad/s"), (DEGREES, "deg/s"), (6.0, None)])
+def test_the_unit_that_a_file_leaves_open_is_that_of_the_turns(by, unit):
+    fixes, imu = drive(1.0)
+    found = unit_of_turns(fixes, scaled(imu, GYRO, by))
+    assert (None if found is None else found.data["unit"]) == unit
+    assert unit is None or abs(found.data["ratio"] - 1.0) < 5.0 * found.data["sd"] < 0.75
+    assert unit_of_turns(fixes.iloc[:90], imu) is None  # too few windows
+
+
+@pytest.mark.parametrize("by", [1.0, DEGREES])
+def test_a_proposal_asks_for_the_unit_of_the_turns(tmp_path, by):
+    """Noise hides the steps of the sensor, which would show the unit, too."""
+    fixes, imu = drive(1.0)
+    noise = np.random.default_rng(3).normal(0.0, 2e-3, (len(imu), 3))
+    table = pd.DataFrame({"time": imu.index})
+    table[["wx", "wy", "wz"]] = (imu[GYRO].to_numpy() + noise) * by
+    table[[f"acc_{a} (m/s2)" for a in "xyz"]] = imu[ACCEL].to_numpy()
+    table.to_csv(tmp_path / "log.csv", index=False)
+    places = fixes[["lat", "lon", "alt"]].rename(columns={"alt": "height_ellipsoid"})
+    places.to_csv(tmp_path / "fixes.csv", index_label="time")
+    unit = "rad/s" if by == 1.0 else "deg/s"
+    log, gnss = (LogTable(path=str(tmp_path / "log.csv")), str(tmp_path / "fixes.csv"))
+    with pytest.raises(DataError, check=coded("navigation.gyro-unit-by-course", unit=unit)) as it:
+        propose(log, gnss=FixesTable(path=gnss))
+    assert it.value.finding.data["flags"] == f"--gyro-unit {unit}"
+    with pytest.raises(DataError, check=coded("io.unit-undecided")):
+        propose(log)
+    (one, _) = sd.doctor([log.path, gnss]).logs
+    assert [q.code for q in one.questions] == ["navigation.gyro-unit-by-course"]
+    assert (one.log.gyro_unit, {*one.streams}) == (unit, {"imu", "gnss"})
+    answer = dict(it.value.finding.data["answers"])
+    assert propose(with_answers(log, answer), gnss=FixesTable(path=gnss)).table["log"] == {
+        "path": log.path,
+        "gyro_unit": unit,
+        "columns": {},
+        "repair": False,
+    }
 
 
 @pytest.mark.parametrize(("by", "unit"), [(DEGREES, "deg/s"), (1.0 / DEGREES, "rad/s")])
