@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from strapdown.constants import MAD_TO_SD, Array
+from strapdown.constants import MAD_TO_SD, Array, Flags
 from strapdown.dsp.samples import true_runs
 from strapdown.errors import DataError, Finding
 from strapdown.frames import ned_from_geodetic, place_difference, ways_between
@@ -262,8 +261,6 @@ def lasting_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float,
 
 
 # Errors of fixes that a Gnss table alone reveals.
-
-Flags = NDArray[np.bool_]
 
 #: Number of fixes that show their scatter; a longer interval, relative to the usual, is a gap; and
 #: residuals beyond so many standard deviations are faults.
