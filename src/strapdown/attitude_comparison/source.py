@@ -252,7 +252,11 @@ def on_clock(source: AttitudeSource) -> tuple[AttitudeSource, SampleClock]:
         Finding(code, file=source.name, quantity="time", severity="note", data=data)
         for code, data in said
     ]
-    return replace(source, imu=imu, findings=(*source.findings, *findings)), clock
+    before = source.findings
+    if clock.repaired and not clock.gaps:
+        # Delays of delivery, as the clock shows.
+        before = tuple(f for f in before if f.code not in ("io.gaps", "io.long-gap"))
+    return replace(source, imu=imu, findings=(*before, *findings)), clock
 
 
 def describe(imu: pd.DataFrame, what: str, whole: pd.DataFrame, clock: SampleClock) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from strapdown.dsp.samples import moving_mean
@@ -29,8 +30,11 @@ MOST_LOST = 0.5
 #: Of the intervals between deliveries, the share that is within this part of the usual one, where
 #: deliveries are even; least share of a size of bursts that counts.
 PACKETS, EVEN, OFTEN = 0.5, 0.1, 0.005
-#: Bursts whose sizes are summed to distinguish losses from a timer.
-BURSTS_SUMMED = 25
+#: Deliveries of a block in which losses are distinguished from a timer, and the fewest.
+BLOCK, LEAST_BLOCK = 100, 25
+#: Deliveries before a late one, and from it on, of which the earliest are compared: a program that
+#: was held up catches up within these.
+BEFORE_LATE, CAUGHT_UP = 5, 25
 #: Steps within this part of a step of whole multiples, and their share, need no tracking.
 MULTIPLE, MULTIPLES = 0.15, 0.98
 #: Stamps within this part of a step (standard deviation) of the clock are left as they are.
@@ -190,10 +194,24 @@ def _gaps(stamps: Array) -> tuple[list[Gap], bool]:
         if ends.size < LEAST:
             # A single pause far longer than the record is not a delivery.
             break
-        gaps = [replace(g, sample=int(ends[g.sample - 1]) + 1) for g in find_gaps(stamps[ends])]
+        early = stamps[ends] - mean * ends
+        gaps = [
+            replace(g, sample=int(ends[g.sample - 1]) + 1)
+            for g in find_gaps(stamps[ends])
+            if not _made_up(early, g.sample, mean)
+        ]
     else:
         return gaps, True
     return find_gaps(stamps), False
+
+
+def _made_up(early: Array, late: int, step: float) -> bool:
+    """Whether the deliveries after a long wait bring the samples of that wait.
+
+    `early`: stamps of the deliveries less the clock of their samples.
+    """
+    before = early[max(late - BEFORE_LATE, 0) : late].min()
+    return bool(early[late : late + CAUGHT_UP].min() - before <= GAP_STEPS * step)
 
 
 def _last_of_bursts(stamps: Array, step: float) -> NDArray[np.bool_]:
@@ -299,8 +317,7 @@ def _of_bursts(stamps: Array, gaps: Sequence[Gap], mean: float) -> tuple[float, 
     if ends.size < LEAST:
         return mean, advance
     # The first burst may have begun before the record. Deliveries at even intervals are full
-    # packets of which samples are lost; or those of a timer that has no whole number of samples to
-    # deliver, whose sizes make up for each other.
+    # packets of which samples are lost; or those of a timer, of all samples since the last.
     usual = float(np.median(apart))
     even = np.abs(apart - usual) <= EVEN * usual
     if even.mean() < PACKETS:
@@ -308,9 +325,11 @@ def _of_bursts(stamps: Array, gaps: Sequence[Gap], mean: float) -> tuple[float, 
     counts = np.bincount(size[1:][even])
     often = np.flatnonzero(counts > OFTEN * counts.sum())
     packet = int(often.max())
-    if often.min() >= packet - 1 and _make_up(size[1:]):
-        return mean, advance
     step = usual / packet
+    late = stamps[ends] / step - ends
+    begins = np.searchsorted(ends, [g.sample for g in gaps])
+    if _make_up(late, ends, even, begins):
+        return mean, advance
     delivered = _followed(stamps[ends], step, size)
     for end, count, clock in zip(ends[1:], size[1:], delivered, strict=True):
         if clock > count:
@@ -320,13 +339,33 @@ def _of_bursts(stamps: Array, gaps: Sequence[Gap], mean: float) -> tuple[float, 
     return step, advance
 
 
-def _make_up(sizes: Numbers) -> bool:
-    """Whether sums over many bursts vary by far less than bursts that are independent."""
-    blocks = sizes.size // BURSTS_SUMMED
-    if blocks < 2:
+def _make_up(late: Array, ends: Numbers, even: NDArray[np.bool_], begins: Numbers) -> bool:
+    """Whether deliveries bring all samples since the last: of a late one the next has fewer.
+
+    Then they are independent about a line; after losses, which add up, they walk off. Of n that
+    are independent the variance about a line is half that of their differences; of a walk it is
+    n/15 of it (a Brownian motion less its line by least squares, in the mean).
+
+    `late`: deliveries less the clock of their samples, in steps; `ends`: their last samples;
+    `even`: intervals between them of the usual length; `begins`: first deliveries after gaps.
+    """
+    squares, count, blocks = 0.0, 0, 0
+    for own, number in zip(np.split(late, begins), np.split(ends, begins), strict=True):
+        if own.size < CAUGHT_UP + LEAST_BLOCK:
+            continue
+        # A program that was held up has caught up where no later delivery is earlier by a step.
+        earliest = sliding_window_view(own, CAUGHT_UP).min(axis=1)
+        in_time = np.flatnonzero(own[: earliest.size] <= earliest + 1.0)
+        for block in np.array_split(in_time, max(in_time.size // BLOCK, 1)):
+            if block.size < LEAST_BLOCK:
+                continue
+            line = np.polynomial.Polynomial.fit(number[block], own[block], 1)
+            squares += float(np.square(own[block] - line(number[block])).sum())
+            count, blocks = count + block.size, blocks + 1
+    if not count:
         return False
-    sums = sizes[: blocks * BURSTS_SUMMED].reshape(blocks, BURSTS_SUMMED).sum(axis=1)
-    return float(sums.var(ddof=1)) < 0.5 * BURSTS_SUMMED * float(sizes.var())
+    most = math.sqrt(0.5 * count / blocks / 15.0)
+    return squares / count < most * float(np.diff(late)[even].var())
 
 
 def _fitted(
@@ -355,13 +394,12 @@ def _fitted(
         here = taken[piece]
         rest = stamps[piece][here] - step * number[piece][here]
         if rest.size < LEAST:
-            # Too few for a clock of their own: evenly between the first and the last.
-            held, count = stamps[piece], number[piece] - number[piece.start]
-            share = count / max(int(count[-1]), 1)
-            fitted[piece] = held[0] + share * (held[-1] - held[0]) if in_bursts else held
+            # Too few to average: the earliest delivery, or as stamped.
+            on_clock = step * number[piece] + (float(rest.min()) if rest.size else 0.0)
+            fitted[piece] = on_clock if in_bursts else stamps[piece]
             continue
         width = min(WINDOW if not in_bursts else WINDOW // 2, rest.size)
-        slow = moving_mean(rest, width)
+        slow = moving_mean(_moving_median(rest, width) if in_bursts else rest, width)
         off = rest - slow
         late = float(np.median(off) - np.quantile(off, 0.05)) if in_bursts else 0.0
         known = np.interp(number[piece], number[piece][here], slow)
@@ -376,6 +414,13 @@ def _fitted(
         np.mean(one_all**2)
     )
     return fitted, step, float(left_all.std()), walks
+
+
+def _moving_median(values: Array, width: int) -> Array:
+    """Median of the `width` values about each; beyond the ends as before them."""
+    from scipy.ndimage import median_filter
+
+    return np.asarray(median_filter(values, width, mode="reflect"))
 
 
 def _stamped(stamps: Array, number: Numbers, step: float) -> NDArray[np.bool_]:

@@ -77,14 +77,20 @@ def test_a_pause_is_no_part_of_the_rate_nor_of_the_verdict(tmp_path):
     assert alone.answer.rate_hz == pytest.approx(bench.answer.rate_hz, rel=1e-6)
 
 
-def test_packets_are_integrated_on_the_clock_of_the_sensor(tmp_path):
+@pytest.mark.parametrize("held_up", [0.0, 0.5])
+def test_packets_are_integrated_on_the_clock_of_the_sensor(tmp_path, held_up):
+    """A program that is held up delivers late: that is no gap."""
     time = np.arange(3000) / RATE
     ends = np.repeat(time[9::10], 10) + np.tile(np.arange(10) * 1e-5, 300)
+    late = (ends > 12.0) & (ends < 12.0 + held_up)
+    ends[late] = 12.0 + held_up + np.arange(late.sum()) * 1e-5
     log = write(tmp_path, ends, rates(time))
     bench = compare_attitude(log, reference=write_truth(tmp_path, time[::2]), **ONE)
     assert bench.clock.kind == "bursts"
     assert bench.clock.rate_hz == pytest.approx(RATE, rel=1e-3)
-    assert "attitude.stamps-in-bursts" in {f.code for f in bench.findings}
+    codes = {f.code for f in bench.findings}
+    assert "attitude.stamps-in-bursts" in codes
+    assert not codes & {"io.gaps", "io.long-gap", "attitude.gap-before-reference"}
     full = bench.sweep[bench.sweep["factor"] == 1]
     # As taken: what is turned in a packet of 0.1 s at up to 1.5 rad/s is 8 deg.
     assert full["max_deg"].max() < 0.5
