@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.errors import Finding
+from strapdown.errors import DivergenceError, Finding
 from strapdown.estimation.covariance import Innovations, Observation
 from strapdown.nav_state import NavState
 from strapdown.rotation import euler_sd
@@ -120,6 +120,11 @@ def standard_deviations(
         Roll, pitch, heading.
     source : str, optional
         Name for messages.
+
+    Raises
+    ------
+    DivergenceError
+        A variance is negative: of a smoother, after a filter that falsely was certain.
     """
     sd = on_disk.room((len(covariance), len(TRAJECTORY_ERROR)))
     without = np.empty(sd.shape, dtype=np.bool_)
@@ -127,8 +132,13 @@ def standard_deviations(
         P = covariance[part]
         variance = np.diagonal(P, axis1=1, axis2=2)
         without[part] = np.isnan(variance)
-        sd[part] = np.sqrt(np.where(without[part], 0.0, variance))
-        sd[part, 6:] = euler_sd(euler[part], P[:, 6:, 6:])
+        with np.errstate(invalid="ignore"):
+            sd[part] = np.sqrt(np.where(without[part], 0.0, variance))
+            sd[part, 6:] = euler_sd(euler[part], P[:, 6:, 6:])
+        lost = (np.isnan(sd[part]) & ~without[part]).any(axis=1)
+        if lost.any():
+            at = float(np.asarray(time)[part][np.argmax(lost)])
+            raise DivergenceError("navigation.covariance-lost", quantity="covariance", time=at)
         on_disk.let_go(covariance)
     index = pd.Index(as_array(time, None, "time", source), name="time", copy=False)
     table = pd.DataFrame(sd, index=index, columns=TRAJECTORY_ERROR, copy=False)

@@ -358,7 +358,7 @@ def smoothing_table(evaluation: NavigationEvaluation) -> TableBlock | None:
         "95 % bounds, medians over the run"
         + ("" if errors is None else "; RMS errors against the truth")
         + ". Consistent: share of the differences within three standard deviations by both "
-        "covariances (99.7 % for a correct model of one linearization).",
+        "covariances, of one linearization (99.7 % for a correct model).",
         strong=(k for k in range(len(rows)) if _apart(agreement, k)),
     )
 

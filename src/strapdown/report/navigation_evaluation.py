@@ -29,7 +29,6 @@ from strapdown.navigation.truth_comparison import (
     TruthComparison,
     band_of_mean,
     compare_with_truth,
-    smoother_consistency,
 )
 from strapdown.report.document import Trust, reason
 from strapdown.report.values import shown_unit
@@ -128,12 +127,10 @@ class NavigationEvaluation:
         """Errors of the filter alone, for a smoothed run."""
         return None if self.run.forward is None else self._errors(self.run.forward)
 
-    @cached_property
+    @property
     def smoother(self) -> SmootherConsistency | None:
         """Agreement of filter and smoother, for a smoothed run."""
-        if self.run.forward is None:
-            return None
-        return smoother_consistency(self.run.forward, self.record, self.run.ellipsoid)
+        return self.run.agreement
 
     @cached_property
     def pair(self) -> tuple[HorizontalErrors, ...]:

@@ -68,6 +68,7 @@ from strapdown.navigation.recorder import IntervalRecorder, Recorder
 from strapdown.navigation.recovery import displaced_stretches, longest, wrong_stretches
 from strapdown.navigation.replay import PipelineRun, relinearized, run_batch, starts_far
 from strapdown.navigation.smoother import RauchTungStriebel
+from strapdown.navigation.truth_comparison import SmootherConsistency, smoother_consistency
 from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
@@ -207,12 +208,15 @@ def run_navigation(
             begun_with, navigator=replace(begun_with.navigator, wrong=chain.navigator.wrong)
         )
         far = starts_far(run.record, sensors)
+        # Of one linearization: further passes are about the smoothed states, the filter is not.
+        agreement = _agreement(run, spec)
         if run.smoothed is not None or (far and chain.navigator.damping.feeds_back):
 
             def show_pass(mode: str, share: float) -> None:
                 progress(f"smoothing: {mode}", ENDED)
 
             run = _about_smoothed(chain, source, recorder, run, far, show_pass)
+            agreement = _agreement(run, spec) if far else agreement
     late = 0.0 if spec.log is None else _late(source)
     if late > 0.0:
         smoothed = None if run.smoothed is None else with_late_samples(run.smoothed, late)
@@ -305,6 +309,7 @@ def run_navigation(
         differences=differences,
         errors=errors,
         forward_differences=forward_differences,
+        agreement=agreement,
         points=points,
         beside=beside,
         withheld=withheld,
@@ -312,6 +317,12 @@ def run_navigation(
         inputs=(*configuration_file(file), *source.inputs),
         findings=tuple(dict.fromkeys(findings)),
     )
+
+
+def _agreement(run: PipelineRun, spec: NavigationSpec) -> SmootherConsistency | None:
+    if run.smoothed is None:
+        return None
+    return smoother_consistency(run.record, run.smoothed, find_ellipsoid(spec.ellipsoid))
 
 
 def _late(source: NavigationSource) -> float:
@@ -767,6 +778,8 @@ class NavigationRun(SavedRun):
         Of these.
     forward_differences : DataFrame or None
         Of the filter solution of a smoothed run.
+    agreement : SmootherConsistency or None
+        Of the filter and the smoother of a smoothed run, about the same states.
     points : ControlPointScore or None
         The path at its control points.
     beside : NavigationRecord or None
@@ -790,6 +803,7 @@ class NavigationRun(SavedRun):
     differences: pd.DataFrame | None
     errors: DifferenceSummary | None
     forward_differences: pd.DataFrame | None
+    agreement: SmootherConsistency | None
     points: ControlPointScore | None
     beside: NavigationRecord | None
     withheld: tuple[Withheld, ...]

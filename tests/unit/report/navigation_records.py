@@ -16,6 +16,7 @@ from strapdown.navigation.consistency import consistency_of_all, inconsistencies
 from strapdown.navigation.heading_integrity import heading_status
 from strapdown.navigation.integrity import IntegrityReport
 from strapdown.navigation.record import Event, NavigationRecord, Span
+from strapdown.navigation.truth_comparison import smoother_consistency
 from strapdown.report.navigation_evaluation import NavigationEvaluation
 from strapdown.rotation import euler_sd
 from strapdown.systems.navigation_run import NavigationRun
@@ -177,6 +178,7 @@ def told(made, *, name="made.csv", truth=None, forward=None, findings=(), withhe
         fine=None,
         record=made,
         forward=forward,
+        agreement=None if forward is None else smoother_consistency(forward, made),
         beside=None,
         withheld=withheld,
         trust=trust,
