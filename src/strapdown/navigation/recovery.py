@@ -19,7 +19,7 @@ from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.measurements.gnss import PLACE, SPEED, Gnss
 from strapdown.navigation.record import NavigationRecord, innovation_labels
 from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY
-from strapdown.tables.checks import Array, index_of, values_of
+from strapdown.tables.checks import Array, find_gaps, index_of, values_of
 from strapdown.tables.gnss import usable
 
 #: Parts of a stretch after which its noise is told of.
@@ -139,7 +139,8 @@ def displaced_stretches(
     What a position moved from one fix to the next beyond the velocity of the solution is a jump of
     the receiver: a solution that is wrong swings by degrees. Between two opposite jumps positions
     are displaced by a constant; the longer part of the record is taken for what is not. A jump and
-    the next one back are a gross error of one fix, which the update rule rejects.
+    the next one back are a gross error of one fix, which the update rule rejects: but not of the
+    first ones after an outage, which it cannot tell, and from which it then rejects all others.
 
     Parameters
     ----------
@@ -175,13 +176,37 @@ def displaced_stretches(
     slip = np.where(told[:, None], 0.0, _slip(record, at, float(np.linalg.norm(aid.lever_arm))))
     stated = np.sqrt(np.square(sd[1:]) + np.square(sd[:-1]) + np.square(slip))
     allowed = np.maximum(JUMPED * scatter, STATED * stated)
-    stamps, found, away = index_of(table)[rows], list[tuple[float, float]](), list[int]()
-    size = 0.0
+    begins = [0, *(gap.sample for gap in find_gaps(at))]
     struck = (np.abs(steps) > allowed).any(axis=1)
+    struck[np.array(begins[1:], dtype=np.intp) - 1] = False  # what an outage made of the solution
     # A solution that is corrected in earnest swings over several steps: those together are no jump.
     beside = np.convolve(struck, np.ones(2 * NEAR + 1), "same") - struck
-    for back in np.flatnonzero(struck & (beside == 0)).tolist():
-        # Jumps are matched as brackets are: gross errors within a stretch, and stretches apart.
+    found, size = list[tuple[int, int]](), 0.0
+    for first, last in _paired(np.flatnonzero(struck & (beside == 0)).tolist(), steps, allowed):
+        if first is None:
+            # Of the first ones after an outage nothing before shows whether they are right.
+            begin = max(one for one in begins if one <= last)
+            if last - begin < FEWEST - 1:
+                found.append((begin, last + 1))
+                size = max(size, float(np.linalg.norm(steps[last])))
+        elif last - first >= FEWEST:
+            found = [one for one in found if one[1] <= first] + [(first + 1, last + 1)]
+            size = max(size, float(np.linalg.norm(0.5 * (steps[first] - steps[last]))))
+    stamps = index_of(table)[rows]
+    middle = 0.5 * (stamps + np.append(stamps[0], stamps[:-1]))
+    stretches = [(float(middle[begin]), float(middle[end])) for begin, end in sorted(found)]
+    if sum(end - begin for begin, end in stretches) > 0.5 * (stamps[-1] - stamps[0]):
+        return (), 0.0
+    return tuple(stretches), size
+
+
+def _paired(jumps: list[int], steps: Array, allowed: Array) -> list[tuple[int | None, int]]:
+    """Jumps away with those back, as brackets are paired, and those without, with None before.
+
+    Gross errors within a stretch, and stretches apart.
+    """
+    pairs, away = list[tuple[int | None, int]](), list[int]()
+    for back in jumps:
         left, jump = steps[away] + steps[back], np.linalg.norm(steps[back])
         reach = math.sqrt(2.0) * np.maximum(allowed[away], allowed[back])
         matched = (np.abs(left) < reach).all(axis=1) & (np.linalg.norm(left, axis=1) < ALIKE * jump)
@@ -189,14 +214,9 @@ def displaced_stretches(
             away.append(back)
             continue
         at_last = int(np.flatnonzero(matched)[-1])
-        first, away = away[at_last], away[:at_last]
-        if back - first >= FEWEST:
-            begin, end = (float(0.5 * (stamps[k] + stamps[k + 1])) for k in (first, back))
-            size = max(size, float(np.linalg.norm(0.5 * (steps[first] - steps[back]))))
-            found = [one for one in found if one[1] < begin] + [(begin, end)]
-    if sum(end - begin for begin, end in found) > 0.5 * (stamps[-1] - stamps[0]):
-        return (), 0.0
-    return tuple(found), size
+        pairs.append((away[at_last], back))
+        away = away[:at_last]
+    return [*pairs, *((None, jump) for jump in away)]
 
 
 def _way(record: NavigationRecord, at: Array, arm: Array) -> tuple[Array, NDArray[np.bool_]]:

@@ -399,3 +399,37 @@ def test_what_a_correction_of_the_solution_moves_is_no_jump(every, sd, found):
     record = SimpleNamespace(trajectory=trajectory, innovations={"gnss.position": told}, sd=marks)
     stretches, _ = displaced_stretches(record, table, Gnss(name="gnss", lever_arm=arm))
     assert [int(one[0]) for one in stretches] == found
+
+
+@pytest.mark.parametrize(("count", "found"), [(1, [(70.0, 80.5)]), (4, [(70.0, 82.0)]), (5, [])])
+def test_the_first_fixes_after_an_outage_may_be_wrong(count, found):
+    """Of the stretch from within the outage to the first right fix; five are as many as speak."""
+    table = displaced((79.9, 79.9 + 0.5 * count, FAULT))
+    table = table[(table.index < 60.0) | (table.index > 79.9)]
+    assert len(seen(table)) == len(found)
+    for (begin, end), (early, late) in zip(seen(table), found, strict=True):
+        assert begin == pytest.approx(early, abs=0.3)
+        assert end == pytest.approx(late - 0.25, abs=0.01)
+
+
+def test_a_wrong_fix_after_an_outage_does_not_keep_the_right_ones_out():
+    """After 36 s without fixes one 6.4 m off, 1.5 sd: the rule held it against all others."""
+    table = displaced((95.9, 96.4, [5.0, -4.0, 0.0]))
+    table = table[(table.index < 60.0) | (table.index > 95.9)]
+    first, (_, run, (finding,)) = navigated(table, pushed(), step=_without_displacements)
+    assert finding.code == "navigation.run-again-with-displacement"
+    (before, _), (after, bounds) = off(first.record), off(run.record)
+    soon = slice(*first.record.trajectory.index.searchsorted([96.6, 110.0]))
+    assert np.median(before[soon]) > 5.0
+    assert np.median(after[soon]) < 0.1
+    assert bounds.max() < 4.0
+
+
+def test_the_step_over_an_outage_is_no_jump():
+    """A solution that drifts in it by 8 m, and the next that drifts back by as much."""
+    table = displaced()
+    time = table.index.to_numpy()
+    table = table[(time < 40.0) | ((time > 60.0) & (time < 90.0)) | (time > 110.0)]
+    at = np.arange(0.0, town.motion().duration, 0.1)
+    slip = 0.4 * (((at > 40.2) & (at < 59.8)) * 1.0 - ((at > 90.2) & (at < 109.8)))
+    assert seen(table, slip=slip[:, None]) == ()
