@@ -181,7 +181,7 @@ def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
     """
     result, record, source = evaluation.run, evaluation.record, evaluation.run.source
     time = record.trajectory.index
-    clock, smoother, points = clock_of(source.imu), evaluation.smoother, result.points
+    clock, smoother, points = clock_of(source.imu), result.agreement, result.points
     data = {
         "conventions": as_comments(conventions(result)),
         "answer": spaced(headline(evaluation)),

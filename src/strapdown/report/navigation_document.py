@@ -330,7 +330,8 @@ def separation_chart(evaluation: NavigationEvaluation) -> Chart | None:
 
 def smoothing_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """Median bounds and errors against the truth, filter and smoother."""
-    forward, agreement, errors = evaluation.run.forward, evaluation.smoother, evaluation.errors
+    run, errors = evaluation.run, evaluation.errors
+    forward, agreement = run.forward, run.agreement
     if forward is None or agreement is None:
         return None
     rows = []
@@ -381,7 +382,7 @@ def smoothing_words(evaluation: NavigationEvaluation) -> str | None:
 
 def agreement_words(evaluation: NavigationEvaluation) -> tuple[tuple[str, str], ...]:
     """Cautions where filter and smoother are inconsistent."""
-    agreement = evaluation.smoother
+    agreement = evaluation.run.agreement
     if agreement is None:
         return ()
     apart = [k for k in range(len(agreement.columns)) if _apart(agreement, k)]

@@ -25,7 +25,6 @@ from strapdown.navigation.consistency import (
 from strapdown.navigation.measurements.measurement import lasting
 from strapdown.navigation.record import NavigationRecord, Span, innovation_labels
 from strapdown.navigation.truth_comparison import (
-    SmootherConsistency,
     TruthComparison,
     band_of_mean,
     compare_with_truth,
@@ -126,11 +125,6 @@ class NavigationEvaluation:
     def forward_errors(self) -> TruthComparison | None:
         """Errors of the filter alone, for a smoothed run."""
         return None if self.run.forward is None else self._errors(self.run.forward)
-
-    @property
-    def smoother(self) -> SmootherConsistency | None:
-        """Agreement of filter and smoother, for a smoothed run."""
-        return self.run.agreement
 
     @cached_property
     def pair(self) -> tuple[HorizontalErrors, ...]:

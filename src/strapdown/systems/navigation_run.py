@@ -209,14 +209,14 @@ def run_navigation(
         )
         far = starts_far(run.record, sensors)
         # Of one linearization: further passes are about the smoothed states, the filter is not.
-        agreement = _agreement(run, spec)
+        agreement = None if far else _agreement(run, spec)
         if run.smoothed is not None or (far and chain.navigator.damping.feeds_back):
 
             def show_pass(mode: str, share: float) -> None:
                 progress(f"smoothing: {mode}", ENDED)
 
             run = _about_smoothed(chain, source, recorder, run, far, show_pass)
-            agreement = _agreement(run, spec) if far else agreement
+        agreement = agreement or _agreement(run, spec)
     late = 0.0 if spec.log is None else _late(source)
     if late > 0.0:
         smoothed = None if run.smoothed is None else with_late_samples(run.smoothed, late)
@@ -320,6 +320,7 @@ def run_navigation(
 
 
 def _agreement(run: PipelineRun, spec: NavigationSpec) -> SmootherConsistency | None:
+    """Test the filter against the smoother, where there is one."""
     if run.smoothed is None:
         return None
     return smoother_consistency(run.record, run.smoothed, find_ellipsoid(spec.ellipsoid))
@@ -485,7 +486,6 @@ def _without_displacements(
         findings += (
             Finding(
                 "navigation.run-again-with-displacement",
-                severity="warning",
                 file=source_of(tables[aid.name]),
                 quantity="lat, lon, alt",
                 size=size,

@@ -4,39 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.unit.systems.test_start_lost import TEXT as ALIGNED
 
 from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import DivergenceError
 from strapdown.navigation.truth_comparison import smoother_consistency
 from strapdown.systems.navigation_run import run_navigation
 
-TEXT = """
-[simulation]
-rate_hz = 50.0
-seed = 8101
-
-[simulation.motion]
-kind = "car"
-lat_deg = 55.75
-lon_deg = 37.62
-alt_m = 150.0
-heading_deg = 30.0
-speed_km_per_h = 50.0
-manoeuvres = [
-  { do = "straight", duration_s = 8.0 },
-  { do = "accelerate", to_km_per_h = 60.0, duration_s = 4.0 },
-  { do = "turn_left", angle_deg = 60.0, radius_m = 40.0 },
-  { do = "straight", duration_s = 5.0 },
-]
-
-[simulation.gnss.rtk]
-rate_hz = 5.0
-position_noise_m = 0.05
-velocity_noise_m_per_s = 0.05
-
-[sensors]
-sensor = "adis16448"
-
+# A shorter drive, from a known start.
+TEXT = (
+    ALIGNED.partition("[coarse]")[0]
+    .replace("rate_hz = 100.0", "rate_hz = 50.0")
+    .replace("duration_s = 20.0", "duration_s = 5.0")
+    .replace("mpu-6050", "adis16448")
+    + """
 [start]
 lat_deg = 55.75
 lon_deg = 37.62
@@ -57,6 +38,7 @@ lever_arm_sd_m = 1.0
 [smoother]
 kind = "rts"
 """
+)
 
 
 def test_passes_leave_the_agreement_as_it_was(tmp_path):

@@ -240,7 +240,8 @@ class Gnss(TabulatedMeasurement):
         A velocity without a vertical component has two components.
         """
         check_gnss(table)
-        time = index_of(table) - self.time_offset
+        stamps = index_of(table)
+        time = stamps - self.time_offset
         good = np.isin(values_of(table, ["quality"])[:, 0], self.qualities)
         times, rows = [], []
         for code, used, columns, sds, delay, factor, least in (
@@ -270,7 +271,7 @@ class Gnss(TabulatedMeasurement):
             if code == POSITION_CODE:
                 value = np.column_stack([np.radians(value[:, :2]), value[:, 2]])
                 for begin, end in self.displaced:
-                    codes[(index_of(table) >= begin) & (index_of(table) < end)] = DISPLACED_CODE
+                    codes[(stamps >= begin) & (stamps < end)] = DISPLACED_CODE
             elif used:
                 # Many receivers output speed and course only.
                 level = good & measured[:, :2].all(axis=1) & ~measured[:, 2]
