@@ -38,7 +38,6 @@ from strapdown.formats.find_columns import (
     reference,
     steady_triads,
     unit_stated,
-    with_reversed,
     without_gyro,
 )
 from strapdown.formats.inference.conclusion import infer_accel, infer_time_unit
@@ -83,7 +82,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     ConfigError: an option names a column that does not exist.
     """
     questions = Questions(raw.name)
-    raw, options = with_reversed(_with_force_of_parts(raw, options), options)
+    raw = _with_force_of_parts(raw, options)
     found = find_columns(raw, options, questions)
     if missing := [q for q in GYRO if q not in found]:
         raise without_gyro(raw, missing)
@@ -223,7 +222,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
             to = ("-" if sign < 0 else "") + f"{triad}_{AXES[j]}"
             because = f"{column.why}; unit {why}; axes {axes.why}"
             first = float(begins[triad][axis])
-            readings.append(Reading(column.source, to, unit, because, first))
+            readings.append(Reading(column.written, to, unit, because, first))
     sampling = sampling_of(log, units)
     _report_gaps(log, time, body["gyro"])
     _report_beyond_limits(log, body, kept)
@@ -375,7 +374,7 @@ def _take_memory(log: LogInUse) -> None:
     """Replace the columns of the log by those of triads that were copied."""
     for triad, block in log.values.items():
         for column, values in zip(log.columns(triad), block.T, strict=True):
-            if log.raw.columns[column.source].dtype == values.dtype:
+            if column.sign > 0.0 and log.raw.columns[column.source].dtype == values.dtype:
                 log.raw.columns[column.source] = values
 
 
@@ -586,13 +585,14 @@ def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
         keep = keep & np.isfinite(raw.columns[clock.source]) if clocks else keep
         mine = [clock, *(found[f"{triad}_{a}"] for a in AXES)]
         names = ["time", *(f"{triad}_{a}" for a in AXES)]
+        values = {c.written: raw.columns[c.source][keep] for c in mine}
         parts.append(
             RawLog(
                 name=raw.name,
                 files=raw.files,
-                columns={c.source: raw.columns[c.source][keep] for c in mine},
+                columns=values | {c.written: -values[c.written] for c in mine if c.sign < 0.0},
                 rows=rows[keep],
-                stated={c.source: (n, c.unit) for c, n in zip(mine, names, strict=True)},
+                stated={c.written: (n, c.unit) for c, n in zip(mine, names, strict=True)},
                 findings=[*raw.findings, *left_out] if triad == "gyro" else [],
             )
         )

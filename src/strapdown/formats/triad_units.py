@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY, Array
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
-from strapdown.formats.arrays import as_rows, numbers
+from strapdown.formats.arrays import as_rows
 from strapdown.formats.columns import parse_axes, read_name
 from strapdown.formats.find_columns import AXES, Column, reference, stated_word
 from strapdown.formats.inference.conclusion import THRESHOLD, Inference
@@ -452,8 +452,7 @@ def values_of_triads(log: LogInUse) -> dict[str, Array]:
 def _triad(log: LogInUse, triad: str) -> Array:
     columns = log.columns(triad)
     parts = [
-        numbers(log.raw, column.source, f"{triad}_{a}")
-        for column, a in zip(columns, AXES, strict=True)
+        column.values(log.raw, f"{triad}_{a}") for column, a in zip(columns, AXES, strict=True)
     ]
     stated, known = [str(c.unit) for c in columns], UNITS[triad]
     by_user = getattr(log.options, f"{triad}_unit", None)
@@ -702,10 +701,10 @@ def _other_columns(log: LogInUse, axes: str) -> str:
     columns = []
     for axis, along in zip(AXES, axes.split(","), strict=True):
         if axis != along:
-            name = log.found[f"gyro_{along[-1]}"].source
-            plain = reference(log.raw, name).removeprefix("-")
-            reversed_ = name.startswith("-") != along.startswith("-")
-            columns.append(f"gyro_{axis}={'-' if reversed_ else ''}{plain}")
+            of = log.found[f"gyro_{along[-1]}"]
+            reversed_ = (of.sign < 0.0) != along.startswith("-")
+            minus = "-" if reversed_ else ""
+            columns.append(f"gyro_{axis}={minus}{reference(log.raw, of.source)}")
     return ",".join(columns)
 
 
