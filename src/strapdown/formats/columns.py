@@ -66,6 +66,7 @@ _HUMPS = re.compile(
 # Between a script of Asia and a letter, which is an axis.
 _SCRIPTS = re.compile(r"(?<=[\u2e80-\uffef])(?=[a-zA-Z])|(?<=[a-zA-Z])(?=[\u2e80-\uffef])")
 _SIGNS = r"[\s_\-/:,;|.#]+"
+_SIGNS_AND_BRACKETS = r"[\s_\-/:,;|.#()\[\]]+"
 # Text in brackets at the end, which may hold brackets: (m/(s*s)).
 _BRACKETS = re.compile(r"[\[(]\s*((?:[^\[\]()]|\([^()]*\))*?)\s*[\])]\s*$")
 # A unit before the axis: Angular velocity (deg/s) X, of a heading in two rows.
@@ -309,7 +310,8 @@ def clocks_with_unit(names: list[str], has_unit: Callable[[str], bool]) -> list[
 
 
 def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> ColumnName:
-    word = "".join(re.split(_SIGNS, text.lower()))
+    # Brackets before those of the unit hold a word of the name: GPS (Lat.) [deg].
+    word = "".join(re.split(_SIGNS if of.sensors else _SIGNS_AND_BRACKETS, text.lower()))
     if (said := _known(word, of)) and not said.loose:
         return replace(said, unit=unit or said.unit)
     rest = word

@@ -27,6 +27,7 @@ from strapdown.formats.text_columns import (
     is_data,
     separator_of,
 )
+from strapdown.formats.vocabularies import TRIADS
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, OF_TABLES, unit_of
 
 _UNIT = re.compile(r"\s*[\[(].*")
@@ -90,6 +91,7 @@ class TableTop:
             if not below and not grouped and over_names:
                 below = self._units_over(over_names[0], width, kinds)
             del self.above[len(self.above) - 1 - bool(below) - grouped - len(marks) :]
+        names = of_arrays(names)
         count: Counter[str] = Counter()
         self.names = []
         for name in names:
@@ -237,6 +239,16 @@ def _filled(fields: list[str]) -> list[str]:
     out: list[str] = []
     for field in fields:
         out.append(field or (out[-1] if out else ""))
+    return out
+
+
+def of_arrays(names: list[str]) -> list[str]:
+    """Number the values of a sensor of which the first alone has its name: ``Gyro, 1, 2``."""
+    out = list(names)
+    for k, name in enumerate(names):
+        numbered = names[k + 1 : k + 3] == ["1", "2"] and names[k + 3 : k + 4] != ["3"]
+        if numbered and read_name(name).quantity in TRIADS:
+            out[k : k + 3] = [f"{name}[{j}]" for j in range(3)]
     return out
 
 

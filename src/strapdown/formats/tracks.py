@@ -1,4 +1,4 @@
-"""Positions of watches, receivers and drones: Garmin FIT, GPX, KML, GeoJSON, subtitles of DJI."""
+"""Positions of watches, receivers, drones: Garmin FIT and TCX, GPX, KML, GeoJSON, DJI."""
 
 from __future__ import annotations
 
@@ -143,6 +143,32 @@ def _of_track(
     ticks = dates.dt.tz_localize(None).to_numpy().astype("datetime64[ns]").astype(np.int64)
     seconds[timed] = ticks / 1e9
     return _points_with_time(RawLog.of(path, {"time": (seconds, "s"), **held}, clock=UNIX), timed)
+
+
+# TCX (https://www8.garmin.com/xmlschemas/TrainingCenterDatabasev2.xsd): points of laps. The schema
+# does not say from which level heights count; devices take them from the sea, or a barometer.
+
+
+detect_tcx = Signs(text=r"\A[\s\S]{0,4092}?<(?:\w+:)?TrainingCenterDatabase[\s>]")
+
+
+def read_tcx_fixes(path: Path) -> RawLog:
+    """Read the points that have a position and a time.
+
+    Raises
+    ------
+    DataError
+        The XML is damaged, or no point has a position and a time.
+    """
+    points = parse("recorders.tcx", path)
+    timed = np.array([t is not None for t in points["time"]], dtype=bool)
+    if not timed.any():
+        raise DataError("io.track-without-time", file=path.name, quantity="time", count=timed.size)
+    places = np.array(points["place"], dtype=np.float64)
+    held = {"lat": (places[:, 1], "deg"), "lon": (places[:, 0], "deg")}
+    if np.isfinite(places[:, 2]).any():
+        held["alt_unstated"] = (places[:, 2], "m")
+    return _of_track(path, points["time"], held, timed)
 
 
 # GeoJSON (RFC 7946): points with a time among their properties, or paths with the times of their

@@ -306,7 +306,50 @@ def test_kml_that_cannot_be_used(tmp_path, text):
     path.write_text(text)
     with pytest.raises(DataError) as refused:
         fixes(path)
-    assert refused.value.finding.code in ("io.kml-unreadable", "io.track-without-time")
+    assert refused.value.finding.code in ("io.track-unreadable", "io.track-without-time")
+
+
+def tcx(kind="Activities", height=True):
+    """Two laps, of which the second begins with the last point of the first; as Garmin has them."""
+
+    def point(k):
+        over = f"<AltitudeMeters>{ALT}</AltitudeMeters>" if height else ""
+        return (
+            f"<Trackpoint><Time>{DATES[k]}</Time><Position><LatitudeDegrees>{LAT[k]:.9f}"
+            f"</LatitudeDegrees><LongitudeDegrees>{LON[k]:.9f}</LongitudeDegrees></Position>{over}"
+            "<HeartRateBpm><Value>120</Value></HeartRateBpm><Extensions><ns3:TPX>"
+            "<ns3:Speed>3.1</ns3:Speed></ns3:TPX></Extensions></Trackpoint>"
+        )
+
+    first, second = ("".join(map(point, r)) for r in (range(10), range(9, COUNT)))
+    inside = "<Trackpoint><Time>2024-03-05T11:59:59Z</Time></Trackpoint>"  # no position yet
+    one = "Activity" if kind == "Activities" else "Course"
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?><TrainingCenterDatabase '
+        'xmlns="http://www.garmin.com/xmlschemas/TrainingCenterDatabase/v2" '
+        'xmlns:ns3="http://www.garmin.com/xmlschemas/ActivityExtension/v2">'
+        f'<{kind}><{one}><Lap StartTime="{DATES[0]}"><Track>{inside}{first}</Track></Lap>'
+        f"<Lap><Track>{second}</Track></Lap></{one}></{kind}></TrainingCenterDatabase>"
+    )
+
+
+def test_laps_of_tcx(tmp_path):
+    path = tmp_path / "activity.tcx"
+    path.write_text(tcx())
+    assert reader_of(path)[0] == "tcx"
+    with pytest.raises(DataError, check=coded("io.height-level-not-stated")):
+        fixes(path)
+    as_read(fixes(path, datum_height_m=0.0))
+    path.write_text(tcx(height=False))
+    with pytest.raises(DataError, check=coded("io.fixes-without-height")):
+        fixes(path)
+    # The times of a planned course are not measured.
+    path.write_text(tcx("Courses"))
+    with pytest.raises(DataError, check=coded("io.track-without-time")):
+        fixes(path, datum_height_m=0.0)
+    path.write_text(tcx()[:-30])
+    with pytest.raises(DataError, check=coded("io.track-unreadable", title="TCX")):
+        fixes(path)
 
 
 def feature(kind, where, **properties):

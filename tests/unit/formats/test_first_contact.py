@@ -27,6 +27,7 @@ from strapdown.formats.columns import read_name
 from strapdown.formats.find_columns import rates_and_force
 from strapdown.formats.novatel import SCALES
 from strapdown.formats.printed_lines import as_rows
+from strapdown.formats.table_top import of_arrays
 from strapdown.formats.vocabularies import FIXES, TRAJECTORIES
 from strapdown.tables import ACCEL, GYRO
 
@@ -937,3 +938,73 @@ def test_names_that_may_be_of_rates_are_listed(tmp_path, name):
     names = ["time_s", *of("acc", "_mss"), *(name.format(a) for a in "abc")]
     with pytest.raises(DataError, check=coded("io.no-gyro-columns")):
         sd.read_imu(tabled(tmp_path, names, [T, FORCE, RATE]))
+
+
+# Layouts that were met on a further round.
+
+
+@pytest.mark.parametrize("form", ["letters", "numbers"])
+def test_a_folder_of_tables_of_a_camera(tmp_path, form, run_cli):
+    """gopro-telemetry (toCsv, deduceHeaders): a table a stream, its name and unit in each heading.
+
+    Where the camera names no axes, the first value has the name, and the others are numbered.
+    """
+
+    def table(stream, name, unit, values):
+        bare = f"{name} [{unit}],1,2"
+        heads = ",".join(f"{name} ({a}) [{unit}]" for a in "zxy") if form == "letters" else bare
+        rows = [f"cts,date,{heads},temperature [°C]"]
+        for k in range(N):
+            order = values[k][[2, 0, 1]] if form == "letters" else values[k]
+            stamp = (DAY + timedelta(seconds=float(T[k]))).isoformat(timespec="milliseconds")
+            stamp = stamp.replace("+00:00", "Z")
+            rows.append(line(1e3 * T[k] + 35.5, stamp, *many(order), "25.3"))
+        written(tmp_path, f"GH010042_HERO9 Black-{stream}.csv", rows)
+
+    table("ACCL", "Accelerometer", "m/s2", FORCE)
+    table("GYRO", "Gyroscope", "rad/s", RATE)
+    heads = "cts,date,GPS (Lat.) [deg],GPS (Long.) [deg],GPS (Alt.) [m],GPS (2D speed) [m/s]"
+    rows = [f"{heads},GPS (3D speed) [m/s],fix,precision,altitude system"]
+    for k in range(15):
+        stamp = (DAY + timedelta(seconds=k)).isoformat().replace("+00:00", ".000Z")
+        rows.append(line(1e3 * k, stamp, LAT[k], LON[k], 520.25, 1.5, 1.6, 3, 120, "MSLV"))
+    gps = written(tmp_path, "GH010042_HERO9 Black-GPS5.csv", rows)
+    imu = sd.read_imu(tmp_path)
+    check(imu, start=DAY.timestamp())
+    assert not {f.code for f in imu.findings} & {"io.tables-not-used"}
+    for path in (tmp_path, gps):
+        fixes = sd.read_gnss(path, position_sd_m=5.0)
+        np.testing.assert_allclose(fixes[["lat", "lon"]], np.column_stack([LAT, LON])[:15])
+        np.testing.assert_array_equal(fixes["alt"], 520.25)
+        np.testing.assert_allclose(np.diff(fixes.index), 1.0)
+    done = run_cli("init", "navigate", tmp_path, "--out", tmp_path / "drive.toml")
+    assert "15 of 15 fixes" in done.out + done.err
+
+
+@pytest.mark.parametrize(
+    ("names", "read"),
+    [
+        (["Gyro [deg/s]", "1", "2"], ["gyro_x", "gyro_y", "gyro_z"]),
+        (["CameraOrientation", "1", "2", "3"], [None, None, None, None]),
+        (["Gyro", "1", "2", "3"], ["gyro", None, None, None]),
+        (["count", "1", "2"], [None, None, None]),
+    ],
+)
+def test_values_of_which_the_first_has_the_name(names, read):
+    assert [read_name(name).quantity for name in of_arrays(names)] == read
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "unit"),
+    [
+        ("GPS (Lat.) [deg]", "lat", "deg"),
+        ("GPS (Long.) [deg]", "lon", "deg"),
+        ("GPS (2D speed) [m/s]", "speed", "m/s"),
+        ("GPS (3D speed) [m/s]", None, "m/s"),
+        ("Altitude (AGL) [m]", None, "m"),
+        ("Speed (OBD)(km/h)", None, "km/h"),
+    ],
+)
+def test_words_in_brackets_before_a_unit(name, quantity, unit):
+    said = read_name(name, FIXES)
+    assert (said.quantity, said.unit) == (quantity, unit)
