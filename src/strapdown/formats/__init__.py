@@ -166,6 +166,11 @@ READERS: dict[str, Reader] = {
     "px4": Reader.of(px4),
     "dataflash": Reader.of(ardupilot, name="dataflash"),
     "mavlink": Reader.of(ardupilot, name="mavlink"),
+    "mavlogdump": Reader(
+        "messages of MAVLink as mavlogdump prints them",
+        ardupilot.detect_mavlogdump,
+        Reader.of(ardupilot, name="mavlink").streams,
+    ),
     "ros": Reader.of(ros, parts=True),
     "novatel": Reader.of(novatel),
     "sbf": Reader.of(receivers, name="sbf"),
