@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -132,6 +133,9 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     let_go(values["gyro"])
     axes = body_axes(log)
     units = units_of_triads(log)
+    if "accel" in units and (turned := _in_world_axes(log)) is not None:
+        log.warn("io.left-out-world-axes", "accel", **turned)
+        del units["accel"]
     values = log.values = {t: values[t] for t in units}
     try:
         finite = _finite_rows(log, ticks)
@@ -1096,6 +1100,47 @@ def _quaternions(raw: RawLog, found: dict[str, Column]) -> tuple[Array | None, l
     q = np.full((len(angles), 4), np.nan)
     q[finite] = rotation.quaternion_from_euler(angles[finite])
     return q, list(EULERS)
+
+
+#: Parts of a log whose mean forces are compared; the least spread of their directions under the
+#: attitude beside them, relative to gravity, and the most of its spread that is left without it.
+_PARTS, _TILTED, _STEADIER = 100, 0.1, 0.5
+#: Most samples of a log that are turned for it.
+MOST_TURNED = 20_000
+
+
+def _in_world_axes(log: LogInUse) -> dict[str, Any] | None:
+    """Return the spreads of a force that is steady as it stands, and not by the attitude beside it.
+
+    The force of a sensor turns with it, and the attitude, whichever way it is meant, turns it back:
+    gravity is then steady. A table of motions may have it turned already.
+    """
+    if log.raw.stated or log.raw.truth is not None:
+        return None
+    with suppress(DataError):
+        q, names = _quaternions(log.raw, log.found)
+        if q is None:
+            return None
+        rows = _known(q) & np.isfinite(log.values["accel"]).all(axis=1)
+        some = slice(None, None, 1 + int(rows.sum()) // MOST_TURNED)
+        force, q = log.values["accel"][rows][some].astype(np.float64), q[rows][some]
+        if len(force) < _PARTS:
+            return None
+        back = q * [1.0, -1.0, -1.0, -1.0]
+        ways = (force, rotation.rotate(q, force), rotation.rotate(back, force))
+        plain, *turned = (_spread(way) for way in ways)
+        if min(turned) > _TILTED and plain < _STEADIER * min(turned):
+            columns = [log.found[name].source for name in names]
+            return {"plain": plain, "turned": min(turned), "columns": columns}
+    return None
+
+
+def _spread(force: Array) -> float:
+    """Return the root mean square change of a force between parts of a log, by its size."""
+    parts = force[: len(force) // _PARTS * _PARTS].reshape(_PARTS, -1, 3).mean(axis=1)
+    size = float(np.linalg.norm(parts, axis=1).mean())
+    change = float(np.sqrt(np.square(parts - parts.mean(axis=0)).sum(axis=1).mean()))
+    return change / size if size > 0.0 else 0.0
 
 
 def _sensor_from_body(raw: RawLog, axes: Turn) -> Array:

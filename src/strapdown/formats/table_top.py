@@ -69,7 +69,7 @@ class TableTop:
         lines = [_named(line, self.separator, width) for line in near] + [None, None]
         names, over = lines[:2]
         if names is None and near:
-            names = self._behind_a_word(near[0], width) or self._names_with_commas(width)
+            names = self._behind_a_word(near[0], width) or self._names_parted_otherwise(width)
         if names is None:
             below = self._units_in_comment(width, kinds)
             named = _above(self.above[:-1] if below else self.above, width, self.separator)
@@ -122,11 +122,13 @@ class TableTop:
             return None
         return [word, *named] if word and not is_data(word) else None
 
-    def _names_with_commas(self, width: int) -> list[str] | None:
-        """Names that commas separate, over rows that blanks do, as POSPac exports them."""
-        if self.separator is not None:
-            return None
-        lines = [fields_of(line, ",") for line in reversed(self.above[-ABOVE:])]
+    def _names_parted_otherwise(self, width: int) -> list[str] | None:
+        """Names that commas separate over rows that blanks do, as POSPac has them, or tabs.
+
+        A board prints names between tabs, and its rows between commas.
+        """
+        between = "," if self.separator is None else "\t"
+        lines = [fields_of(line, between) for line in reversed(self.above[-ABOVE:])]
         fits = (n for n in lines if len(n) == width and all(n) and not are_data(n))
         return next(fits, None)
 

@@ -648,6 +648,8 @@ def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]
         ):
             fault = Finding("io.contradicts-unit", **data, likely=instead, reason=other.finding())
             log.questions.ask(fault, gyro_unit=instead)
+        elif triad == "gyro" and "accel" in units and (stood := _stood_still(unit, other)):
+            log.warn("io.gravity-stood-still", "accel", reason=stood)
         if not other.settled:
             continue
         # Sizes of rates alone do not contradict a statement: gravity that rotated with them
@@ -708,15 +710,18 @@ def _other_columns(log: LogInUse, axes: str) -> str:
     return ",".join(columns)
 
 
+def _stood_still(unit: str, inferred: Inference) -> Finding | None:
+    """Return the evidence that gravity stood still where a gyro in this unit turns it."""
+    of_unit = (e for e in inferred.evidence if e.data.get("unit") == unit)
+    return next((e for e in of_unit if e.code == "io.evidence-gravity-stood-still"), None)
+
+
 def _instead(unit: str, inferred: Inference, scale: Inference | None = None) -> str | None:
     """Return the most probable unit of a gyro if gravity that stood still excludes the stated one.
 
     The numbers need not settle which of the others it is.
     """
-    if not any(
-        e.code == "io.evidence-gravity-stood-still" and e.data["unit"] == unit
-        for e in inferred.evidence
-    ):
+    if _stood_still(unit, inferred) is None:
         return None
     shares = dict(((inferred.value, inferred.confidence), *inferred.alternatives))
     others = [str(u) for u in shares if u not in (unit, None)]

@@ -958,6 +958,7 @@ _OPEN = (
     "io.accelerometer-not-read",
     "io.columns-like-accelerometer",
     "io.left-out-unusable",
+    "io.left-out-world-axes",
 )
 
 #: Motion that is missing, and units and axes that contradict gravity or the course.
@@ -969,6 +970,7 @@ _LIMITS = (
     "io.axes-not-stated-z-up",
     "io.axes-upside-down",
     "io.force-scale",
+    "io.gravity-stood-still",
     "io.gyro-axes-differ",
     "io.gyro-axis-in-other-unit",
     "io.gyro-axis-noise-of-other-unit",

@@ -1008,3 +1008,56 @@ def test_values_of_which_the_first_has_the_name(names, read):
 def test_words_in_brackets_before_a_unit(name, quantity, unit):
     said = read_name(name, FIXES)
     assert (said.quantity, said.unit) == (quantity, unit)
+
+
+def test_names_between_tabs_over_rows_between_commas(tmp_path):
+    """Sketches for the Nano 33 BLE print both, below what the library says of its sensor."""
+    top = ["Started", "Gyroscope sample rate = 100.00 Hz", "", "Gyroscope in degrees/second"]
+    rows = [*top, "aX\taY\taZ\tgX\tgY\tgZ"]
+    rows += [line(*many(FORCE[k] / STANDARD_GRAVITY), *many(RATE[k] * DEG)) for k in range(N)]
+    imu = sd.read_imu(written(tmp_path, "nano.txt", rows))
+    check(imu)
+
+
+def of_world(rng, tilt, time=T):
+    """Rates in rad/s, attitude to axes of the world (w first), and forces in both."""
+    u = np.maximum(time - 3.0, 0.0)
+    angles = [0.9 * np.sin(0.5 * u), tilt * np.sin(0.7 * u) ** 3, tilt * np.sin(0.9 * u) ** 3]
+    turn = Rotation.from_euler("ZYX", np.column_stack(angles))
+    rate = np.vstack([(turn[:-1].inv() * turn[1:]).as_rotvec() / STEP, np.zeros(3)])
+    world = 0.5 * np.sin(np.outer(u, [1.1, 2.2, 3.3])) + [0.0, 0.0, STANDARD_GRAVITY]
+    world += rng.normal(0.0, 0.01, world.shape)
+    q = turn.as_quat()[:, [3, 0, 1, 2]]
+    return rate + rng.normal(0.0, 1e-3, rate.shape), q, turn.inv().apply(world), world
+
+
+@pytest.mark.parametrize("way", ["to the world", "from the world"])
+@pytest.mark.parametrize("tilt", [0.2, 1.2])
+def test_an_acceleration_in_axes_of_the_world_beside_a_quaternion(tmp_path, way, tilt):
+    """Applications turn it by the attitude: with gravity in it, it looks like a specific force."""
+    rate, q, body, world = of_world(np.random.default_rng(4), tilt)
+    q = q if way == "to the world" else q * [1.0, -1.0, -1.0, -1.0]
+    names = "time_s,gx_dps,gy_dps,gz_dps,ax_m_s2,ay_m_s2,az_m_s2,qw,qx,qy,qz"
+    for force, left_out in ((world, True), (body, False)):
+        rows = [names]
+        for k in range(N):
+            rows.append(line(*many([T[k]]), *many(rate[k] * DEG), *many(force[k]), *many(q[k])))
+        imu = sd.read_imu(written(tmp_path, "log.csv", rows))
+        assert ("accel_x" not in imu) == left_out
+        found = [f for f in imu.findings if f.code == "io.left-out-world-axes"]
+        assert len(found) == left_out
+        np.testing.assert_allclose(imu[GYRO], rate, atol=1e-6)
+
+
+def test_a_force_that_stands_still_where_the_gyro_turns(tmp_path):
+    time = STEP * np.arange(4 * N)
+    rate, _, body, world = of_world(np.random.default_rng(4), 1.2, time)
+    names = "time_s,gx_dps,gy_dps,gz_dps,ax_m_s2,ay_m_s2,az_m_s2"
+    for force, still in ((world, True), (body, False)):
+        rows = [names]
+        for k in range(len(time)):
+            rows.append(line(*many([time[k]]), *many(rate[k] * DEG), *many(force[k])))
+        imu = sd.read_imu(written(tmp_path, "log.csv", rows))
+        assert [f.quantity for f in imu.findings if f.code == "io.gravity-stood-still"] == (
+            ["accel"] * still
+        )
