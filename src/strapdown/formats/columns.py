@@ -19,6 +19,7 @@ from strapdown.formats.vocabularies import (
     CHIP,
     CLOCKS,
     COUNTERS,
+    CRASHES,
     DIRECTIONS,
     LOGS,
     MAGNETIC,
@@ -148,6 +149,8 @@ def _read_name(name: str, of: Vocabulary, unit: str) -> ColumnName:
         if not of.sensors:
             return ColumnName(None)  # q[0] is a part of an array, not a column q in units of 0
         text, index = match.groups()
+    if of.stems and (code := _of_code(text, unit)) is not None:
+        return code
     if not of.sensors and len(text) <= LONGEST:
         text = _HEMISPHERE.sub(r"\1", text)
     said = _of_format(text, index) if of.sensors else None
@@ -185,6 +188,25 @@ def split_brackets(text: str) -> tuple[str, str]:
     if bracket is None or text[: bracket.start()].rstrip().endswith(("/", "^")):
         return text, ""
     return text[: bracket.start()], bracket.group(1)
+
+
+def _of_code(text: str, unit: str) -> ColumnName | None:
+    """Read a channel code of ISO MME, which a table has as a name; None for another name.
+
+    What moves with a body of its own, as an occupant's head, is none of the vehicle.
+    """
+    from strapdown.formats.mme_codes import DIMENSIONS, decode_mme
+
+    bare, bracket = split_brackets(text)
+    code = decode_mme(bare)
+    if code is None or not code.vehicle or code.code[12:14] not in DIMENSIONS:
+        return None
+    return ColumnName(
+        code.quantity if code.body == "vehicle" else "other",
+        unit_of(bracket or unit, CRASHES.kinds),
+        family=code.code[:12].lower(),
+        axis=code.axis,
+    )
 
 
 def _of_format(text: str, index: str) -> ColumnName | None:
