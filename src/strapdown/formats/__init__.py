@@ -218,6 +218,7 @@ READERS: dict[str, Reader] = {
     "gpx": Reader.of(tracks, "GPX track (.gpx)", "gpx"),
     "kml": Reader.of(tracks, "KML track (.kml .kmz)", "kml"),
     "tcx": Reader.of(tracks, "Garmin TCX track (.tcx)", "tcx"),
+    "igc": Reader.of(tracks, "flight recorder (.igc)", "igc"),
     "geojson": Reader.of(tracks, "GeoJSON with times (.geojson .json)", "geojson"),
     "dji-srt": Reader.of(tracks, "subtitles of a DJI drone (.SRT)", "dji"),
     "packed": Reader.of(table_files, name="packed"),
@@ -249,6 +250,9 @@ READERS: dict[str, Reader] = {
     "kf-gins-folder": Reader.of(kf_gins, name="folder"),
     "psins": Reader.of(toolboxes, "PSINS increments (.imu)", name="psins"),
     "npy-folder": Reader.of(table_files, "folder of NumPy arrays (.npy)", "numpy_folder"),
+    "sensor-table": Reader(
+        sensor_folder.TABLE_TITLE, sensor_folder.detect_table, {TABLE: sensor_folder.read_table}
+    ),
     "csv": Reader("text table (.csv .txt .tsv .dat)", csv.detect, {TABLE: csv.read}),
     "python-ins": Reader.of(toolboxes, "python-ins arrays: imu, fix, truth (.npz)", "python_ins"),
     "sbet": Reader.of(receivers, name="sbet"),

@@ -130,7 +130,7 @@ def _records(path: Path, stamp: int) -> tuple[dict[str, Record], int]:
 _RECORDS = frozenset({*DATAFLASH_STREAMS.values(), "GPA", "XKF1", "NKF1"})
 # A message as mavlogdump of pymavlink prints it, and a name in it, before its value.
 _PRINTED = re.compile(r"\d{4}-\d\d-\d\d [\d:.]+: (\w+) \{(.*)\}\s*")
-_NAME = re.compile(r"(?:^|, )(\w+) : ")
+_NAME = re.compile(r"(?:^|, +)(\w+) : ")
 
 
 def _dumped(data: bytes, wanted: Container[str]) -> tuple[dict[str, Record], int]:

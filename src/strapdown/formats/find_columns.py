@@ -24,6 +24,7 @@ from strapdown.formats.columns import (
     read_name,
     split_brackets,
 )
+from strapdown.formats.inference.conclusion import EPOCH
 from strapdown.formats.recording import INFERRED, STATED, Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import (
     BODY_RATES,
@@ -194,7 +195,10 @@ def without_gyro(raw: RawLog, missing: list[str]) -> DataError:
     """Make the error for a log without three rates; the message lists its columns."""
     if _is_nameless(raw):
         return DataError(_nameless(raw, {}))
-    said = {name: str(read_name(name).quantity) for name in raw.columns}
+    said = {
+        name: raw.stated[name][0] if name in raw.stated else str(read_name(name).quantity)
+        for name in raw.columns
+    }
     force = [n for n, q in said.items() if q.startswith("accel_")]
     force = force if {said[n][-1] for n in force} == set(AXES) else _letters_of_g(raw, said)
     # The letter g alone is as often a force.
@@ -394,6 +398,8 @@ COMPARED, MOST_SAMPLES, SPANS = 64, 6000, (25, 100, 200)
 FEWEST_CHANGES = 8
 #: Least share of the changes that a gyro explains, and how far below the best the first may be.
 LEAST, NEAR = 0.8, 0.1
+#: Largest error of the norm of a quaternion: of four numbers written with three decimals.
+UNIT_NORM = 2e-3
 #: Least turn of a force in all, rad.
 TURNED = 0.05
 
@@ -405,6 +411,8 @@ def rates_and_force(columns: list[NDArray[np.generic]]) -> tuple[int, int] | Non
     triads explains the motion.
     """
     held = [_varied(c) for c in columns[:COMPARED]]
+    for k in _of_quaternions(columns[:COMPARED]):
+        held[k] = None
     triads: dict[int, Array] = {}
     for k in range(len(held) - 2):
         columns_of = [c for c in held[k : k + 3] if c is not None]
@@ -425,6 +433,21 @@ def rates_and_force(columns: list[NDArray[np.generic]]) -> tuple[int, int] | Non
     if best < LEAST:
         return None
     return min(pair for pair, share in shares.items() if share > best - NEAR)
+
+
+def _of_quaternions(columns: list[NDArray[np.generic]]) -> set[int]:
+    """Return the numbers of columns of which four neighbors are a quaternion of unit norm.
+
+    Its parts turn, too, and three of them may have a steady norm.
+    """
+    out: set[int] = set()
+    for k in range(len(columns) - 3):
+        four = columns[k : k + 4]
+        if all(c.dtype.kind == "f" for c in four):
+            values = np.column_stack([c[:MOST_SAMPLES] for c in four]).astype(np.float64)
+            off = np.abs(np.linalg.norm(values, axis=1) - 1.0)
+            out |= set(range(k, k + 4)) if bool((off < UNIT_NORM).all()) else set()
+    return out
 
 
 def _explained(turned: Array, force: Array, span: int) -> float:
@@ -743,6 +766,16 @@ def is_clock(raw: RawLog, name: str) -> bool:
     return values.dtype.kind != "O" or bool(values.size and is_stamp(str(values[0])))
 
 
+def is_dated(raw: RawLog, name: str) -> bool:
+    """Whether a clock has dates, or numbers since 1970 in s, ms, us or ns."""
+    values = raw.columns[name]
+    if values.dtype.kind not in "iuf":
+        return is_clock(raw, name)
+    known = values[np.isfinite(values.astype(np.float64))]
+    first = float(known[0]) if known.size else 0.0
+    return any(EPOCH[0] <= first * factor <= EPOCH[1] for factor in (1.0, 1e-3, 1e-6, 1e-9))
+
+
 def unit_stated(raw: RawLog, column: str) -> str | None:
     """Return the unit of a column of a sensor, as a row of units, its name or ROS states it."""
     if column in raw.units:
@@ -1012,6 +1045,11 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
         elif len(clocks) > 1:
             # A lone T is as often a temperature; a text that is not a stamp is not a clock.
             other = {n for n in clocks if n == "T" or not is_clock(raw, n)} - set(asked.values())
+            # Beside a clock since 1970 a count from the start of a logger is of no use.
+            dated = [n for n in clocks if n not in other and is_dated(raw, n)]
+            alone = "gyro_x" not in names_of_quantities(raw)
+            if alone and len(dated) == 1 and "time" not in asked:
+                other |= set(clocks) - {*dated}
             names = [n for n in names if n not in other or other >= set(clocks)]
         by_name = find_quantities(names, FIXES, asked, raw.name, raw.units)
         if "time" not in by_name and (clock := clock_by_values(raw)):

@@ -74,6 +74,19 @@ def read(path: Path) -> RawLog:
     return raw
 
 
+#: A table of its own that is named after a sensor, whose columns are x, y and z.
+TABLE_TITLE = "text table of one sensor, in its name"
+detect_table = Signs(
+    suffixes=csv.SUFFIXES,
+    also=lambda path: _triad(file_member(path)) is not None and _has_bare_axes(file_member(path)),
+)
+
+
+def read_table(path: Path) -> RawLog:
+    """Read the table of one sensor, after which it is named."""
+    return _log(file_member(path))
+
+
 def read_fixes(path: Path) -> RawLog:
     """Read the table of positions beside those of sensors.
 
@@ -105,11 +118,17 @@ def _triad(member: Member) -> str | None:
     return kind if kind and _has_axes(member, kind) else None
 
 
+def _has_bare_axes(member: Member) -> bool:
+    """Whether a table names columns x, y and z."""
+    fields = [f.strip() for f in fields_of(first_line(member))]
+    return sorted(m[1].lower() for f in fields if (m := _AXIS.fullmatch(f))) == [*AXES]
+
+
 def _has_axes(member: Member, triad: str) -> bool:
     """Whether a table names axes, bare or as those of its sensor and of no other."""
-    fields = [f.strip() for f in fields_of(first_line(member))]
-    if sorted(m[1].lower() for f in fields if (m := _AXIS.fullmatch(f))) == [*AXES]:
+    if _has_bare_axes(member):
         return True
+    fields = [f.strip() for f in fields_of(first_line(member))]
     said = [str(read_name(name).quantity) for name in of_arrays(fields)]
     of_sensors = sorted(q for q in said if q.partition("_")[0] in _TRIADS)
     return of_sensors == [f"{triad}_{axis}" for axis in AXES]

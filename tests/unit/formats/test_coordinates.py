@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -350,6 +351,43 @@ def test_laps_of_tcx(tmp_path):
     path.write_text(tcx()[:-30])
     with pytest.raises(DataError, check=coded("io.track-unreadable", title="TCX")):
         fixes(path)
+
+
+@pytest.mark.parametrize(
+    ("level", "code"),
+    [("HFALGALTGPS:ELL", ""), ("HFALGALTGPS:GEO", "io.height-over-sea-column"), ("", "open")],
+)
+def test_a_flight_recorder(tmp_path, level, code):
+    """Across midnight, with a fix of which the receiver has no altitude."""
+
+    def row(at, lat, lon, valid="A"):
+        minutes = [round(60e3 * abs(v)) for v in (lat, lon)]
+        places = f"{minutes[0] // 60000:02d}{minutes[0] % 60000:05d}{'NS'[lat < 0]}"
+        places += f"{minutes[1] // 60000:03d}{minutes[1] % 60000:05d}{'EW'[lon < 0]}"
+        return f"B{at}{places}{valid}00480{520 if valid == 'A' else 0:05d}009"
+
+    rows = ["AXYZABC", "HFDTEDATE:050324,01", "HFFXA035", *([level] if level else [])]
+    rows += [row("235958", -48.25, -11.5), row("235959", -48.25, -11.5, "V")]
+    rows += [row("000000", -48.250100, -11.500050), "LXYZ a comment", row("000001", -48.25, -11.5)]
+    path = tmp_path / "flight.igc"
+    path.write_text("\r\n".join(rows) + "\r\n")
+    assert reader_of(path)[0] == "igc"
+    stated = {} if level.endswith("ELL") else {"datum_height_m": 0.0}
+    if stated:
+        code = "io.height-level-not-stated" if code == "open" else code
+        with pytest.raises(DataError, check=coded(code)):
+            fixes(path)
+    got = fixes(path, **stated)
+    noon = datetime(2024, 3, 5, 23, 59, 58, tzinfo=UTC).timestamp()
+    np.testing.assert_array_equal(got.index, noon + np.array([0.0, 2.0, 3.0]))
+    # A thousandth of a minute.
+    np.testing.assert_allclose(got["lat"], [-48.25, -48.2501, -48.25], rtol=0, atol=0.5 / 60e3)
+    np.testing.assert_allclose(got["lon"], [-11.5, -11.50005, -11.5], rtol=0, atol=0.5 / 60e3)
+    np.testing.assert_array_equal(got["alt"], 520.0)
+    assert "io.fixes-without-position-left-out" in [f.code for f in got.findings]
+    path.write_text("\n".join(rows).replace("050324", "990324"))
+    with pytest.raises(DataError, check=coded("io.track-time-no-date")):
+        fixes(path, **stated)
 
 
 def feature(kind, where, **properties):

@@ -1061,3 +1061,47 @@ def test_a_force_that_stands_still_where_the_gyro_turns(tmp_path):
         assert [f.quantity for f in imu.findings if f.code == "io.gravity-stood-still"] == (
             ["accel"] * still
         )
+
+
+def test_fixes_that_are_held_beside_an_accelerometer_alone(tmp_path):
+    """TrackAddict: a row a sample, each with the last fix again, and a clock since 1970."""
+    heads = "Time,UTC Time,Latitude,Longitude,Altitude (m),Altitude (ft),Speed (Km/h),Speed (MPH)"
+    rows = ["# RaceRender Data: TrackAddict 4.7.0", f"{heads},Heading,Accel X,Accel Y,Accel Z"]
+    for k in range(N):
+        last = k // 100
+        fix = [f"{LAT[last]:.7f}", f"{LON[last]:.7f}", 520.0, 1706.0, 10.8 + last, 6.711, 45.0]
+        clocks = [f"{T[k]:.3f}", f"{DAY.timestamp() + T[k]:.3f}"]
+        rows.append(line(*clocks, *fix, *many(FORCE[k] / STANDARD_GRAVITY, 3)))
+    got = sd.read_gnss(
+        written(tmp_path, "log.csv", rows), position_sd_m=3.0, velocity_sd_m_per_s=1.0
+    )
+    assert got.attrs["clock"] == "unix"
+    np.testing.assert_allclose(
+        got.index + got.attrs["clock_origin"], DAY.timestamp() + np.arange(15)
+    )
+    np.testing.assert_allclose(got["lat"], LAT[:15], atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity"),
+    [("session_gyro.csv", "gyro_x"), ("Polar_ACC.txt", "accel_x"), ("walk.csv", None)],
+)
+def test_a_table_of_one_sensor_that_its_name_says(tmp_path, name, quantity):
+    rows = ["timestamp [ms],x,y,z"]
+    rows += [line(1000 * T[k], *many(RATE[k] * DEG)) for k in range(N)]
+    path = written(tmp_path, name, rows)
+    if quantity == "gyro_x":
+        imu = sd.read_imu(path, units={"gyro": "deg/s"})
+        np.testing.assert_allclose(imu[GYRO], RATE, atol=1e-6)
+        return
+    code = "io.accelerometer-alone" if quantity else "io.no-gyro-columns"
+    with pytest.raises(DataError, check=coded(code)):
+        sd.read_imu(path)
+
+
+def test_a_quaternion_among_columns_without_names_is_no_force():
+    """Three of its four parts had the norm of gravity in g, and turned."""
+    q = TURN.as_quat()
+    columns = [T, *q.T, *TURN.as_euler("xyz").T, *RATE.T, *FORCE.T]
+    assert rates_and_force(columns) == (8, 11)
+    assert rates_and_force([*q.T, *RATE.T]) is None
