@@ -1102,8 +1102,8 @@ def _quaternions(raw: RawLog, found: dict[str, Column]) -> tuple[Array | None, l
     return q, list(EULERS)
 
 
-#: Parts of a log whose mean forces are compared; the least spread of their directions under the
-#: attitude beside them, relative to gravity, and the most of its spread that is left without it.
+#: Parts of a log whose mean forces are compared; least tilt, as its sine, by the attitude beside
+#: them; most spread of a force as it stands, relative to that of the force turned by the attitude.
 _PARTS, _TILTED, _STEADIER = 100, 0.1, 0.5
 #: Most samples of a log that are turned for it.
 MOST_TURNED = 20_000
@@ -1113,12 +1113,14 @@ def _in_world_axes(log: LogInUse) -> dict[str, Any] | None:
     """Return the spreads of a force that is steady as it stands, and not by the attitude beside it.
 
     The force of a sensor turns with it, and the attitude, whichever way it is meant, turns it back:
-    gravity is then steady. A table of motions may have it turned already.
+    gravity is then steady. A table of motions may have it turned already. A body that banks in its
+    turns looks the same: columns that the user names are the sensor's.
     """
-    if log.raw.stated or log.raw.truth is not None:
+    raw, named = log.raw, log.found["accel_x"].basis == "option"
+    if raw.stated or raw.truth is not None or raw.axes is not None or named:
         return None
     with suppress(DataError):
-        q, names = _quaternions(log.raw, log.found)
+        q, names = _quaternions(raw, log.found)
         if q is None:
             return None
         rows = _known(q) & np.isfinite(log.values["accel"]).all(axis=1)
@@ -1126,10 +1128,14 @@ def _in_world_axes(log: LogInUse) -> dict[str, Any] | None:
         force, q = log.values["accel"][rows][some].astype(np.float64), q[rows][some]
         if len(force) < _PARTS:
             return None
+        # About one direction, as that of gravity, even a force across it is steady as it stands.
+        mean = rotation.dcm_from_quaternion(q).mean(axis=0)
+        tilt = np.sqrt(max(0.0, 1.0 - float(np.linalg.norm(mean, 2)) ** 2))
         back = q * [1.0, -1.0, -1.0, -1.0]
-        ways = (force, rotation.rotate(q, force), rotation.rotate(back, force))
-        plain, *turned = (_spread(way) for way in ways)
-        if min(turned) > _TILTED and plain < _STEADIER * min(turned):
+        plain, *turned = map(
+            _spread, (force, rotation.rotate(q, force), rotation.rotate(back, force))
+        )
+        if tilt > _TILTED and plain < _STEADIER * min(turned):
             columns = [log.found[name].source for name in names]
             return {"plain": plain, "turned": min(turned), "columns": columns}
     return None

@@ -74,12 +74,17 @@ def read(path: Path) -> RawLog:
     return raw
 
 
-#: A table of its own that is named after a sensor, whose columns are x, y and z.
 TABLE_TITLE = "text table of one sensor, in its name"
-detect_table = Signs(
-    suffixes=csv.SUFFIXES,
-    also=lambda path: _triad(file_member(path)) is not None and _has_bare_axes(file_member(path)),
-)
+
+
+def _is_of_one_sensor(path: Path) -> bool:
+    """Whether a table of its own is named after a sensor, in a word, and its columns x, y and z."""
+    table = file_member(path)
+    in_words = re.search(r"[A-Za-z]{3}", table.stem) is not None
+    return in_words and _triad(table) is not None and _has_bare_axes(table)
+
+
+detect_table = Signs(suffixes=csv.SUFFIXES, also=_is_of_one_sensor)
 
 
 def read_table(path: Path) -> RawLog:

@@ -1049,6 +1049,26 @@ def test_an_acceleration_in_axes_of_the_world_beside_a_quaternion(tmp_path, way,
         np.testing.assert_allclose(imu[GYRO], rate, atol=1e-6)
 
 
+@pytest.mark.parametrize("motion", ["roundabout", "banked"])
+def test_a_steady_force_of_a_body_in_a_turn(tmp_path, motion):
+    """Across the axis of the turn it is steady as it stands; banked it looks as if of the world."""
+    heading = 0.5 * T
+    bank = 0.5 * np.sin(0.25 * heading) if motion == "banked" else 0.0 * T
+    turn = Rotation.from_euler("ZYX", np.column_stack([heading, 0.0 * T, bank]))
+    rate = np.vstack([(turn[:-1].inv() * turn[1:]).as_rotvec() / STEP, np.zeros(3)])
+    across = 3.0 if motion == "roundabout" else 0.0
+    force = np.column_stack([0.0 * T, across + 0.0 * T, -STANDARD_GRAVITY / np.cos(bank)])
+    force += np.random.default_rng(2).normal(0.0, 0.05, force.shape)
+    q = turn.as_quat()[:, [3, 0, 1, 2]]
+    rows = ["time_s,gx_dps,gy_dps,gz_dps,ax_m_s2,ay_m_s2,az_m_s2,qw,qx,qy,qz"]
+    for k in range(N):
+        rows.append(line(*many([T[k]]), *many(rate[k] * DEG), *many(force[k]), *many(q[k])))
+    path = written(tmp_path, "log.csv", rows)
+    assert ("accel_x" in sd.read_imu(path)) == (motion == "roundabout")
+    imu = sd.read_imu(path, columns={"accel": "a"})
+    np.testing.assert_allclose(imu[ACCEL], force, atol=1e-5)
+
+
 def test_a_force_that_stands_still_where_the_gyro_turns(tmp_path):
     time = STEP * np.arange(4 * N)
     rate, _, body, world = of_world(np.random.default_rng(4), 1.2, time)
