@@ -24,7 +24,6 @@ from strapdown.formats.columns import (
     read_name,
     split_brackets,
 )
-from strapdown.formats.inference.conclusion import EPOCH
 from strapdown.formats.recording import INFERRED, STATED, Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import (
     BODY_RATES,
@@ -766,16 +765,6 @@ def is_clock(raw: RawLog, name: str) -> bool:
     return values.dtype.kind != "O" or bool(values.size and is_stamp(str(values[0])))
 
 
-def is_dated(raw: RawLog, name: str) -> bool:
-    """Whether a clock has dates, or numbers since 1970 in s, ms, us or ns."""
-    values = raw.columns[name]
-    if values.dtype.kind not in "iuf":
-        return is_clock(raw, name)
-    known = values[np.isfinite(values.astype(np.float64))]
-    first = float(known[0]) if known.size else 0.0
-    return any(EPOCH[0] <= first * factor <= EPOCH[1] for factor in (1.0, 1e-3, 1e-6, 1e-9))
-
-
 def unit_stated(raw: RawLog, column: str) -> str | None:
     """Return the unit of a column of a sensor, as a row of units, its name or ROS states it."""
     if column in raw.units:
@@ -1045,11 +1034,6 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
         elif len(clocks) > 1:
             # A lone T is as often a temperature; a text that is not a stamp is not a clock.
             other = {n for n in clocks if n == "T" or not is_clock(raw, n)} - set(asked.values())
-            # Beside a clock since 1970 a count from the start of a logger is of no use.
-            dated = [n for n in clocks if n not in other and is_dated(raw, n)]
-            alone = "gyro_x" not in names_of_quantities(raw)
-            if alone and len(dated) == 1 and "time" not in asked:
-                other |= set(clocks) - {*dated}
             names = [n for n in names if n not in other or other >= set(clocks)]
         by_name = find_quantities(names, FIXES, asked, raw.name, raw.units)
         if "time" not in by_name and (clock := clock_by_values(raw)):
