@@ -79,9 +79,9 @@ def doctor(
             raise as_flag(error, lambda key: LOG_FLAGS.get(f"log, {key}", key)) from None
 
     def show(result: Diagnosis) -> None:
-        paths = {one.name: log.path for log, one in zip(result.spec.logs, result.logs, strict=True)}
+        paths = {one.name: one.log.path for one in result.logs}
         for one in result.logs:
-            print_log(one, paths, [x.log.path for x in result.logs], tables=write.verbose)
+            print_log(one, paths, [x.path for x in result.spec.logs], tables=write.verbose)
         print_findings(result.between)
 
     folder = folder_to_write(out, logs[0], "doctor", write.force)

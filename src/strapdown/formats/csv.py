@@ -230,7 +230,7 @@ def _sections(numbered: Lines) -> list[tuple[str, Lines]]:
             if (
                 {"_x", "_y", "_z"} <= axes
                 or set("xyz") <= {n.lower()[:1] for n in names}
-                or _are_fixes(names)
+                or are_fixes(names)
             ):
                 heads.append((k, names))
     if len({tuple(names) for _, names in heads}) < 2:
@@ -280,7 +280,7 @@ def _joined(
         rows, lines = _whole_lines(top, True, name, findings)
         columns = _parse(lines, len(top.names), top.separator, name)
         log = _log(top, name, files, columns, np.array(rows), [])
-        if fixes is None and not any(map(_is_gyro, log.columns)) and _are_fixes(log.columns):
+        if fixes is None and not any(map(_is_gyro, log.columns)) and are_fixes(log.columns):
             fixes = log
         else:
             logs.append(log)
@@ -301,7 +301,8 @@ def _joined(
     return dataclasses.replace(raw, fixes=fixes)
 
 
-def _are_fixes(names: Iterable[str]) -> bool:
+def are_fixes(names: Iterable[str]) -> bool:
+    """Whether the names of columns say latitude and longitude."""
     return {"lat", "lon"} <= {read_name(n, FIXES).quantity for n in names}
 
 

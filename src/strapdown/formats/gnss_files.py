@@ -370,7 +370,8 @@ def _height(found: dict[str, Found], values: Callable[[str], Array], raw: RawLog
 
 def _rows_of_fixes(raw: RawLog, found: dict[str, Found]) -> RawLog:
     """Leave out rows of a table of inertial samples that have no fix, or the last one again."""
-    if not {"lat", "lon"} <= found.keys() or "gyro_x" not in names_of_quantities(raw):
+    of_samples = {"gyro_x", "accel_x"} & names_of_quantities(raw)
+    if not {"lat", "lon"} <= found.keys() or not of_samples:
         return raw
     place = [
         np.asarray(numbers(raw, found[q].source, q), dtype=np.float64)

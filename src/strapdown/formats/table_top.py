@@ -27,6 +27,7 @@ from strapdown.formats.text_columns import (
     is_data,
     separator_of,
 )
+from strapdown.formats.vocabularies import TRIADS
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, OF_TABLES, unit_of
 
 _UNIT = re.compile(r"\s*[\[(].*")
@@ -68,7 +69,7 @@ class TableTop:
         lines = [_named(line, self.separator, width) for line in near] + [None, None]
         names, over = lines[:2]
         if names is None and near:
-            names = self._behind_a_word(near[0], width) or self._names_with_commas(width)
+            names = self._behind_a_word(near[0], width) or self._names_parted_otherwise(width)
         if names is None:
             below = self._units_in_comment(width, kinds)
             named = _above(self.above[:-1] if below else self.above, width, self.separator)
@@ -90,6 +91,7 @@ class TableTop:
             if not below and not grouped and over_names:
                 below = self._units_over(over_names[0], width, kinds)
             del self.above[len(self.above) - 1 - bool(below) - grouped - len(marks) :]
+        names = of_arrays(names)
         count: Counter[str] = Counter()
         self.names = []
         for name in names:
@@ -120,11 +122,13 @@ class TableTop:
             return None
         return [word, *named] if word and not is_data(word) else None
 
-    def _names_with_commas(self, width: int) -> list[str] | None:
-        """Names that commas separate, over rows that blanks do, as POSPac exports them."""
-        if self.separator is not None:
-            return None
-        lines = [fields_of(line, ",") for line in reversed(self.above[-ABOVE:])]
+    def _names_parted_otherwise(self, width: int) -> list[str] | None:
+        """Names that commas separate over rows that blanks do, as POSPac has them, or tabs.
+
+        A board prints names between tabs, and its rows between commas.
+        """
+        between = "," if self.separator is None else "\t"
+        lines = [fields_of(line, between) for line in reversed(self.above[-ABOVE:])]
         fits = (n for n in lines if len(n) == width and all(n) and not are_data(n))
         return next(fits, None)
 
@@ -237,6 +241,16 @@ def _filled(fields: list[str]) -> list[str]:
     out: list[str] = []
     for field in fields:
         out.append(field or (out[-1] if out else ""))
+    return out
+
+
+def of_arrays(names: list[str]) -> list[str]:
+    """Number the values of a sensor of which the first alone has its name: ``Gyro, 1, 2``."""
+    out = list(names)
+    for k, name in enumerate(names):
+        numbered = names[k + 1 : k + 3] == ["1", "2"] and names[k + 3 : k + 4] != ["3"]
+        if numbered and read_name(name).quantity in TRIADS:
+            out[k : k + 3] = [f"{name}[{j}]" for j in range(3)]
     return out
 
 
