@@ -17,6 +17,7 @@ from tests.map_files import mbtiles, pmtiles, png
 from strapdown.errors import ConfigError
 from strapdown.studio import app as studio_app
 from strapdown.studio import server
+from strapdown.studio.app import SAMPLES
 from strapdown.studio.events import states_of
 from strapdown.studio.folder import Folder
 from strapdown.studio.jobs import Jobs
@@ -27,7 +28,6 @@ from strapdown.studio.live_jobs import (
     live_info,
     shown_state,
 )
-from strapdown.studio.samples import SAMPLES
 
 
 @pytest.mark.parametrize("name", sorted(SAMPLES))
