@@ -17,8 +17,7 @@ from tests.map_files import mbtiles, pmtiles, png
 from strapdown.errors import ConfigError
 from strapdown.studio import app as studio_app
 from strapdown.studio import server
-from strapdown.studio.app import SAMPLES
-from strapdown.studio.events import states_of
+from strapdown.studio.app import SAMPLES, states_of
 from strapdown.studio.folder import Folder
 from strapdown.studio.jobs import Jobs
 from strapdown.studio.live_jobs import (

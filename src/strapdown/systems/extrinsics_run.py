@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 
 from strapdown.bundle import InputFiles, input_files, log_files
-from strapdown.config.extrinsics import ExtrinsicsSpec
 from strapdown.config.logs import AxesTable
+from strapdown.config.navigation import ExtrinsicsSpec
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.error_model import PHYSICAL
 from strapdown.evaluation.extrinsics import (
