@@ -31,7 +31,7 @@ from strapdown.crash.structure import (
 )
 from strapdown.dsp.chi_square import chi_square_above
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
-from strapdown.sensors.unmeasured import NO_GYRO
+from strapdown.sensors.crash_unit import NO_GYRO
 from strapdown.tables.checks import Array
 
 # Relative to the largest variance: smaller covariances are rounding.

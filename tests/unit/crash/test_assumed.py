@@ -30,6 +30,7 @@ from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash
 from strapdown.errors import DataError
 from strapdown.sensors.crash_unit import (
     TURN_SHAPES,
+    TURNS,
     Assumed,
     CrashUnit,
     Mounting,
@@ -37,7 +38,6 @@ from strapdown.sensors.crash_unit import (
     turning_shapes,
 )
 from strapdown.sensors.uncertainty import TriadUncertainty
-from strapdown.sensors.unmeasured import TURNS
 from strapdown.simulation.crash_motion import CRASHES
 from strapdown.simulation.crash_recording import paper_units, record_crash
 from strapdown.tables import NED, VELOCITY
