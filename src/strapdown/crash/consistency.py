@@ -31,7 +31,7 @@ from strapdown.crash.structure import (
 )
 from strapdown.dsp.chi_square import chi_square_above
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
-from strapdown.sensors.unmeasured import NO_GYRO
+from strapdown.sensors.crash_unit import NO_GYRO
 from strapdown.tables.checks import Array
 
 # Relative to the largest variance: smaller covariances are rounding.
@@ -166,10 +166,12 @@ def floored(covariance: Array) -> Array:
     return np.asarray(covariance + max(FLOOR * largest, TINY) * np.eye(covariance.shape[-1]))
 
 
-def common_edges(
-    units: Sequence[PointKinematics], window: tuple[float, float] | None, pieces: int
-) -> Array:
-    """Edges of equal intervals over a window that all units cover.
+#: Intervals of a comparison, at most, and the probability below which it is a disagreement.
+PIECES, LEVEL = 20, 1e-3
+
+
+def common_edges(units: Sequence[PointKinematics]) -> Array:
+    """Edges of equal intervals over the crash, as far as all units cover it.
 
     `DataError`: the units do not cover it. `ConfigError`: an interval is shorter than two samples.
     """
@@ -179,19 +181,18 @@ def common_edges(
     last = min(float(u.time[-1]) for u in units)
     # A unit without a gyro does not know the turning after the time of its assumption.
     known = [u.assumed_until for u in units]
-    start, end = (max(first, -0.1), min(last, 0.75, *known)) if window is None else window
+    start, end = max(first, -0.1), min(last, 0.75, *known)
     if not first <= start < end <= last:
         begins = next(u.name for u in units if u.time[0] == first)
         ends = next(u.name for u in units if u.time[-1] == last)
-        wanted = (-0.1, 0.75) if window is None else window
         raise DataError(
             "crash.share-does-not-cover-begins",
             quantity="window",
             units=[u.name for u in units],
             first=first,
             last=last,
-            wanted=wanted[0],
-            wanted_2=wanted[1],
+            wanted=-0.1,
+            wanted_2=0.75,
             begins=begins,
             ends=ends,
         )
@@ -204,7 +205,7 @@ def common_edges(
             end=end - start,
             coarsest=coarsest,
         )
-    return np.linspace(start, end, min(pieces, most) + 1)
+    return np.linspace(start, end, min(PIECES, most) + 1)
 
 
 def velocity_increments(unit: PointKinematics, edges: Array) -> VelocityIncrements:
@@ -731,37 +732,25 @@ def axis_findings(match: AxisMatch, first: str, second: str) -> list[Finding]:
 NO_WEIGHT = 1e8
 
 
-def compare_units(
-    units: Sequence[PointKinematics],
-    *,
-    window: tuple[float, float] | None = None,
-    pieces: int = 20,
-    level: float = 1e-3,
-) -> UnitComparison:
+def compare_units(units: Sequence[PointKinematics]) -> UnitComparison:
     """Compare two or more units of one rigid vehicle at one point, pairwise and against their mean.
 
-    `window`, s, by default -0.1 to 0.75 s as far as recorded, is cut into `pieces`, fewer where
-    each would have less than two samples. With the difference d of the velocity increments and its
-    covariance C from all stated uncertainties, ``dᵀ C⁻¹ d`` is chi-square distributed; common
-    errors (a shared gyro, the leveling) cancel in both. A probability below `level` is a
-    disagreement: structural ringing at one position, or any unstated error; so is a single error
-    that explains their differences much better than structure (`single_error`). Assumed axes, and
-    intervals in which a unit was clipped without a wider range, are left out. Each pair is checked
-    for swapped axes, a rotated mounting and wrong positions. `DataError`, `ConfigError`: the window
-    is not covered or too short, an option out of range.
+    The crash, -0.1 to 0.75 s as far as recorded, is cut into `PIECES`, fewer where each would have
+    less than two samples. With the difference d of the velocity increments and its covariance C
+    from all stated uncertainties, ``dᵀ C⁻¹ d`` is chi-square distributed; common errors (a shared
+    gyro, the leveling) cancel in both. A probability below `LEVEL` is a disagreement: structural
+    ringing at one position, or any unstated error; so is a single error that explains their
+    differences much better than structure (`single_error`). Assumed axes, and intervals in which a
+    unit was clipped without a wider range, are left out. Each pair is checked for swapped axes, a
+    rotated mounting and wrong positions. `DataError`, `ConfigError`: the units share no or too
+    short a part.
     """
-    if not (pieces >= 3 and 0.0 < level < 1.0):
-        raise ConfigError(
-            "crash.pieces-level", quantity="pieces, level", pieces=pieces, level=level
-        )
-    edges = common_edges(units, window, pieces)
+    edges = common_edges(units)
     increments = [velocity_increments(u, edges) for u in units]
     cut = [clipped_pieces(u, edges) for u in units]
     rigid = unlearnt(units)
     pairs = tuple(
-        compare_pair(
-            units[i], units[j], increments[i], increments[j], ~(cut[i] | cut[j]), level, rigid
-        )
+        compare_pair(units[i], units[j], increments[i], increments[j], ~(cut[i] | cut[j]), rigid)
         for i, j in itertools.combinations(range(len(units)), 2)
     )
     kept = ~np.any(cut, axis=0)
@@ -790,7 +779,7 @@ def compare_units(
         chi,
         freedom,
         probability,
-        probability >= level and all(p.agree for p in pairs),
+        probability >= LEVEL and all(p.agree for p in pairs),
         structure,
         _turned_by_points(units, common, structure, kept),
         tuple(u.name for u in units if doubted[u.name] or any(f.file == u.name for f in odd)),
@@ -903,14 +892,13 @@ def compare_pair(
     a: VelocityIncrements,
     b: VelocityIncrements,
     kept: Flags,
-    level: float,
     rigid: Structure,
     explained: bool = True,
 ) -> UnitPair:
     """Compare two units over the `kept` intervals of their increments `a` and `b`.
 
-    `level` as `compare_units`; `rigid`: the structural process of the vehicle, without size;
-    `explained`: whether a mounting is looked for that would explain a disagreement.
+    `rigid`: the structural process of the vehicle, without size; `explained`: whether a mounting is
+    looked for that would explain a disagreement.
     """
     edges = a.edges
     a, b = a.of_pieces(kept), b.of_pieces(kept)
@@ -938,7 +926,7 @@ def compare_pair(
     # An axis that is not measured has a variance of zero, or its rounding.
     variance = np.maximum(np.diag(covariance), 0.0)
     force[1, kept] = np.sqrt(variance).reshape(-1, 3) / lengths + told
-    agree, findings = probability >= level, list[Finding]()
+    agree, findings = probability >= LEVEL, list[Finding]()
     whole = not (first.assumed_axes or second.assumed_axes) and bool(kept.any())
     whole = whole and (agree or explained)
     body = body_turning((a, b)) if whole else None
@@ -992,7 +980,7 @@ def compare_pair(
             effects = _single_effects((first, second), stiff, kept, body)
             if body is not None:
                 difference, plain = difference - body.shift, floored(plain - body.known)
-            error = single_error(effects, structure, edges, kept, difference, plain, level)
+            error = single_error(effects, structure, edges, kept, difference, plain, LEVEL)
         if error is not None:
             agree = False
             if error.code == OFF_MOUNTING and turned.sd_deg.max() < math.degrees(MOST_SD):

@@ -25,7 +25,7 @@ from strapdown.crash.acceleration import NOISE, by_contributor, window_weights
 from strapdown.crash.entry import Entry, angles_sd
 from strapdown.crash.measuring_point import SampleEffects
 from strapdown.dsp.chi_square import chi_square_quantile
-from strapdown.dsp.cubics import hermite
+from strapdown.dsp.samples import hermite
 from strapdown.earth import earth_rate
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.measuring_point import PointKinematics, SampleEffects
 from strapdown.errors import Finding
-from strapdown.sensors.unmeasured import AXES
+from strapdown.sensors.crash_unit import AXES
 from strapdown.tables.checks import Array
 
 #: Line of the error budget.

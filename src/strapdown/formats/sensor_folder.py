@@ -17,12 +17,12 @@ from pathlib import Path, PurePosixPath
 from strapdown.errors import DataError, add_note
 from strapdown.formats import csv
 from strapdown.formats.columns import read_name
+from strapdown.formats.csv import of_arrays
 from strapdown.formats.find_columns import AXES, find_columns
 from strapdown.formats.inference.conclusion import EPOCH
 from strapdown.formats.join import join
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions
 from strapdown.formats.signs import Signs, while_unchanged
-from strapdown.formats.table_top import of_arrays
 from strapdown.formats.text_columns import fields_of
 from strapdown.formats.vocabularies import WITHOUT_GRAVITY
 from strapdown.parsers import parse

@@ -24,10 +24,10 @@ from strapdown.errors import DataError
 from strapdown.formats import printed_lines, reader_of
 from strapdown.formats.arrays import nanoseconds_of
 from strapdown.formats.columns import read_name
+from strapdown.formats.csv import of_arrays
 from strapdown.formats.find_columns import rates_and_force
 from strapdown.formats.novatel import SCALES
 from strapdown.formats.printed_lines import as_rows
-from strapdown.formats.table_top import of_arrays
 from strapdown.formats.vocabularies import FIXES, TRAJECTORIES
 from strapdown.tables import ACCEL, GYRO
 
