@@ -299,7 +299,7 @@ def stamp_step(
     usual, lone = _irregular(steps)
     if usual is None:
         return None
-    lost = ~lone & (np.round(steps / usual) > 1.0) & (steps < min(SHORT * usual, SHORT_S))
+    lost = ~lone & (np.round(steps / usual) > 1.0) & (steps < SHORT_S)
     ways = _Ways(gnss, usual)
     for k in np.flatnonzero(lone | lost).tolist():
         found = _stamp_step(ways, k, bool(lone[k]), windows)

@@ -227,6 +227,7 @@ def on_the_way(speed, rate=1.0, noise=1.0, *, size=0.0, at=100.0, lost=(), later
         (5.0, 0.02, -0.9),
         (10.0, 0.01, 0.788),
         (1.0, 0.1, 1.0),
+        (10.0, 0.01, 0.7),
         (4.0, 0.01, -0.059),
         (4.0, 0.3, -0.222),
     ],
@@ -251,6 +252,8 @@ def test_what_is_no_step_of_a_clock_is_none(seed):
         on_the_way(15.0, seed=seed),
         # Lost fixes, one of them alone; a receiver that begins anew at other instants.
         on_the_way(15.0, lost=[(40.0, 41.0), (60.0, 63.0), (90.0, 97.0)], seed=seed),
+        on_the_way(15.0, 10.0, 0.02, lost=[(40.0, 40.7), (60.0, 62.3), (90.0, 92.8)], seed=seed),
+        on_the_way(15.0, 10.0, 0.5, lost=[(40.0, 40.7), (60.0, 62.3), (90.0, 92.8)], seed=seed),
         on_the_way(15.0, noise=0.5, later=0.6, seed=seed),
         on_the_way(15.0, 5.0, 0.02, later=0.07, seed=seed),
     ):
