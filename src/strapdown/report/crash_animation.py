@@ -42,21 +42,9 @@ def path_animation(
 ) -> Animation:
     """Animate the vehicle along its path with its attitude.
 
-    Parameters
-    ----------
-    outline : Outline
-        In vehicle axes.
-    point : sequence of float, (3,), m
-        Reference point of the path, in vehicle axes.
-    names : (str, str)
-        Of the first two axes of the path.
-    reference : DataFrame, optional
-        ``north east down`` of the point in the axes of the path, m.
-
-    Returns
-    -------
-    Animation
-        At most `MOST_FRAMES` frames, at samples of the path.
+    `outline`: in vehicle axes. `point`, (3,), m: reference point of the path, in vehicle axes.
+    `names`: of the first two axes of the path. `reference`: ``north east down`` of the point in the
+    axes of the path, m. Returns: at most `MOST_FRAMES` frames, at samples of the path.
     """
     body = vehicle_body(outline)
     rows = np.unique(
@@ -175,17 +163,8 @@ def crash_stills(
 ) -> Picture:
     """Draw the vehicle at up to six instants of its path.
 
-    Parameters
-    ----------
-    point : sequence of float, (3,), m
-        Reference point in vehicle axes.
-    ground : float, m
-        Down coordinate of the drawn ground, in the axes of the path.
-
-    Returns
-    -------
-    Picture
-        All views have one scale.
+    `point`, (3,), m: reference point in vehicle axes. `ground`, m: down coordinate of the drawn
+    ground, in the axes of the path. All views have one scale.
     """
     places = path.table[NED].to_numpy(dtype=np.float64)
     instants = _instants(path, events)
@@ -307,16 +286,9 @@ _SIDE, _TOP, _GLASS, _FRONT = "#9fb3c8", "#cdd8e2", "#3d5166", "#D55E00"
 class VehicleBody:
     """Corners and faces of a vehicle body.
 
-    Attributes
-    ----------
-    corners : ndarray, (n, 3), m
-        Vehicle axes forward, right, down, from the vehicle's origin.
-    faces : tuple of tuple of int
-        Corner indices of each face.
-    colours : tuple of str
-        One per face.
-    cabin : int
-        Number of faces, at the end, that belong to a cabin on top of the body.
+    `corners`, (n, 3), m: vehicle axes forward, right, down, from the vehicle's origin. `faces`:
+    corner indices of each face. `colours`: one per face. `cabin`: number of faces, at the end, that
+    belong to a cabin on top of the body.
     """
 
     corners: Array = field(repr=False)
@@ -332,12 +304,8 @@ class VehicleBody:
     def seen(self, corners: Array, away: Array) -> list[int]:
         """Visible faces, farthest first, for any attitude of the body.
 
-        Parameters
-        ----------
-        corners : ndarray, (n, 3), m
-            As returned by `placed`.
-        away : ndarray, (3,)
-            Viewing direction, in the same axes.
+        `corners`, (n, 3), m: as returned by `placed`. `away`, (3,): viewing direction, in the same
+        axes.
         """
         lower = range(len(self.faces) - self.cabin)
         upper = range(len(self.faces) - self.cabin, len(self.faces))
@@ -359,13 +327,8 @@ class VehicleBody:
     def placed(self, at: ArrayLike, q_nb: ArrayLike, point: ArrayLike) -> Array:
         """Corners in the axes of the path, (n, 3), m.
 
-        Parameters
-        ----------
-        at : array_like, (3,), m
-            Position of `point`.
-        q_nb : array_like, (4,)
-        point : array_like, (3,), m
-            Of the vehicle, in vehicle axes.
+        `at`, (3,), m: position of `point`. `q_nb`, (4,). `point`, (3,), m: of the vehicle, in
+        vehicle axes.
         """
         arms = self.corners - np.asarray(point, dtype=np.float64)
         return np.asarray(rotation.rotate(q_nb, arms) + np.asarray(at, dtype=np.float64))
@@ -374,10 +337,7 @@ class VehicleBody:
 def vehicle_body(outline: Outline) -> VehicleBody:
     """Make a body from an outline: a car with a cabin, or a plain body for a stated outline.
 
-    Parameters
-    ----------
-    outline : Outline
-        In vehicle axes.
+    `outline`: in vehicle axes.
     """
     ring = hull(outline.body)
     if len(ring) > _RING:

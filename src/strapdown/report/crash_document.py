@@ -411,17 +411,8 @@ def _findings(result: CaseResult) -> tuple[Block | None, ...]:
 def reference_in_path_axes(path: CrashPath, answer: ReferenceAnswer) -> pd.DataFrame:
     """Positions of a reference path, shifted to agree with the reconstruction at the entry.
 
-    Parameters
-    ----------
-    path : CrashPath
-        Reconstructed path of the comparison.
-    answer : ReferenceAnswer
-        Answer with a reference path.
-
-    Returns
-    -------
-    DataFrame
-        ``north east down``, m, indexed by time, s, as used in the comparison.
+    `path`: reconstructed path of the comparison. `answer`: answer with a reference path. Returns:
+    ``north east down``, m, indexed by time, s, as used in the comparison.
     """
     assert answer.path is not None
     errors = answer.path.errors

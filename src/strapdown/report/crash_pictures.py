@@ -37,22 +37,11 @@ _LEAST_WEDGE = 1.0
 class Direction:
     """Direction of force of one event.
 
-    Attributes
-    ----------
-    horizontal_deg : float, deg
-        Direction from which the force came, clockwise from the front.
-    interval : AngleInterval or None
-        The 95 % interval.
-    delta_v : float, m/s
-        Length of the change of velocity.
-    main : bool
-        Drawn with a strong line; the others thin.
-    number : int or None
-        Index of the unit whose answer it is, from 0; None for the main answer.
-    vertical_deg : float, deg
-        Positive from above.
-    vertical : AngleInterval or None
-        Its 95 % interval.
+    `horizontal_deg`, deg: direction from which the force came, clockwise from the front.
+    `interval`: the 95 % interval. `delta_v`, m/s: length of the change of velocity. `main`: drawn
+    with a strong line; the others thin. `number`: index of the unit whose answer it is, from 0;
+    None for the main answer. `vertical_deg`, deg: positive from above. `vertical`: its 95 %
+    interval.
     """
 
     name: str
@@ -77,24 +66,11 @@ def pdof_dial(
 ) -> Picture:
     """Draw directions of force about a vehicle, seen from above with its front upward.
 
-    Parameters
-    ----------
-    outline : Outline
-        In vehicle axes.
-    directions : sequence of Direction
-        One per event, in time order.
-    recorders : sequence of Direction
-        Of the main event by each recorder, marked by its number.
-    point : sequence of float, m
-        Reference point in vehicle axes, at the center of the dial.
-    small : bool
-        Draw the dial alone, for a page with the numbers beside it.
-
-    Returns
-    -------
-    Picture
-        An arrow from the origin of each force towards the point, its interval as a wedge; a shaded
-        ring if the direction is undetermined.
+    `outline`: in vehicle axes. `directions`: one per event, in time order. `recorders`: of the main
+    event by each recorder, marked by its number. `point`, m: reference point in vehicle axes, at
+    the center of the dial. `small`: draw the dial alone, for a page with the numbers beside it.
+    Returns: an arrow from the origin of each force towards the point, its interval as a wedge; a
+    shaded ring if the direction is undetermined.
     """
     rows = sorted(directions, key=lambda d: not d.main)
     height = 2.0 * _TOP + 26.0 + sum(64.0 if d.main else 33.0 for d in rows)
@@ -184,19 +160,9 @@ def elevation_dial(
 ) -> Picture:
     """Draw the vertical angle of a force in its own vertical plane.
 
-    Parameters
-    ----------
-    outline : Outline
-        In vehicle axes; drawn from the right for a force from the front or the rear, and from
-        behind for one from a side.
-    main : Direction
-    recorders : sequence of Direction
-        Of the same event, marked by their numbers.
-
-    Returns
-    -------
-    Picture
-        The angle above the horizontal, with its 95 % interval as a wedge.
+    `outline`: in vehicle axes; drawn from the right for a force from the front or the rear, and
+    from behind for one from a side. `recorders`: of the same event, marked by their numbers.
+    Returns: the angle above the horizontal, with its 95 % interval as a wedge.
     """
     angle = math.remainder(main.horizontal_deg, 360.0)
     aside = 45.0 < abs(angle) < 135.0
@@ -281,14 +247,8 @@ def _elevation_words(d: Direction) -> str:
 class PointChange:
     """Change of velocity at a measuring point.
 
-    Attributes
-    ----------
-    unit : MountingPoint
-    delta_v : sequence of float, (3,), m/s
-        At the point itself, along the axes of the vehicle.
-    covariance : ndarray, (3, 3)
-    at_least : bool
-        The record holds a part only.
+    `delta_v`, (3,), m/s: at the point itself, along the axes of the vehicle. `covariance`, (3, 3).
+    `at_least`: the record holds a part only.
     """
 
     unit: MountingPoint
@@ -304,16 +264,8 @@ _POINTS_CAR, _POINTS_ARROW = 210.0, 96.0
 def points_picture(outline: Outline, changes: Sequence[PointChange]) -> Picture:
     """Draw the measuring points on the vehicle, each with its change of velocity as an arrow.
 
-    Parameters
-    ----------
-    outline : Outline
-        In vehicle axes, drawn with its front upward.
-    changes : sequence of PointChange
-
-    Returns
-    -------
-    Picture
-        Arrows at one scale, with the 95 % ellipse of each at its tip; numbers below.
+    `outline`: in vehicle axes, drawn with its front upward. Returns: arrows at one scale, with the
+    95 % ellipse of each at its tip; numbers below.
     """
     low, high = outline.low, outline.high
     scale = _POINTS_CAR / float(max(high - low))
@@ -487,12 +439,8 @@ _EXAMPLE = 40.0  # deg, of the example force that shows the sign of the angle
 class MountingPoint:
     """Mounting position of a unit.
 
-    Attributes
-    ----------
-    position : sequence of float, (3,), m
-        Vehicle axes, from the vehicle's origin.
-    number : int
-        Index of the unit, from 0; sets its color.
+    `position`, (3,), m: vehicle axes, from the vehicle's origin. `number`: index of the unit, from
+    0; sets its color.
     """
 
     name: str
@@ -509,17 +457,9 @@ def conventions_picture(
 ) -> Picture:
     """Draw the sign conventions of axes, roll, pitch, heading and direction of force.
 
-    Parameters
-    ----------
-    outline : Outline
-        In vehicle axes.
-    point : sequence of float, (3,), m
-        Reference point, in vehicle axes from the vehicle's origin.
-
-    Returns
-    -------
-    Picture
-        The vehicle from above, from its right side and from behind, at one scale.
+    `outline`: in vehicle axes. `point`, (3,), m: reference point, in vehicle axes from the
+    vehicle's origin. Returns: the vehicle from above, from its right side and from behind, at one
+    scale.
     """
     where = ", ".join(f"{u.name} at {_place(u.position)}" for u in units)
     alt = (

@@ -79,23 +79,10 @@ def path_plan(
 ) -> Picture:
     """Draw a path from above.
 
-    Parameters
-    ----------
-    outline : Outline
-        In vehicle axes.
-    point : sequence of float, m
-        Reference point of the path, in vehicle axes.
-    names : (str, str)
-        Of the first two axes of the path.
-    reference : DataFrame, optional
-        ``north east`` of the point in the axes of the path, m, indexed by time.
-    small : bool
-        Draw for half a page width, with letters as large as at the whole width.
-
-    Returns
-    -------
-    Picture
-        A path short against the vehicle is also drawn enlarged, if the width permits.
+    `outline`: in vehicle axes. `point`, m: reference point of the path, in vehicle axes. `names`:
+    of the first two axes of the path. `reference`: ``north east`` of the point in the axes of the
+    path, m, indexed by time. `small`: draw for half a page width, with letters as large as at the
+    whole width. A path short against the vehicle is also drawn enlarged, if the width permits.
     """
     plan = _plan(path, events, reference)
     whole = _SMALL_WIDTH if small else _WIDTH
@@ -303,17 +290,10 @@ _FOOT = 18.0
 class PlanFrame:
     """Mapping of a level plane to a picture.
 
-    Attributes
-    ----------
-    left, top, width, height : float
-        Of the frame, in pixels.
-    middle : (float, float), m
-        First and second coordinate (north and east, or forward and right) of the frame's middle.
-    scale : float
-        Pixels per meter.
-    names : (str, str)
-        Of the two coordinates. North is drawn up and east to the right; forward to the right and
-        right downward, which is the same plane rotated by a quarter turn, seen from above.
+    `left`, `top`, `width`, `height`: of the frame, in pixels. `middle`, m: first and second
+    coordinate (north and east, or forward and right) of the frame's middle. `scale`: pixels per
+    meter. `names`: of the two coordinates. North is drawn up and east to the right; forward to the
+    right and right downward, which is the same plane rotated by a quarter turn, seen from above.
     """
 
     left: float
@@ -341,16 +321,8 @@ class PlanFrame:
     ) -> PlanFrame:
         """The largest view that contains all points.
 
-        Parameters
-        ----------
-        points : ndarray, (n, 2), m
-        names : (str, str)
-        at : (float, float)
-            Upper left corner of the frame.
-        heights : (float, float)
-            Minimum and maximum height of the frame.
-        margin : float
-            Pixels around the points.
+        `points`, (n, 2), m. `at`: upper left corner of the frame. `heights`: minimum and maximum
+        height of the frame. `margin`: pixels around the points.
         """
         finite = points[np.isfinite(points).all(axis=1)]
         low, high = (finite.min(axis=0), finite.max(axis=0)) if len(finite) else (-np.ones(2),) * 2

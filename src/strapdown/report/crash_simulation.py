@@ -414,17 +414,8 @@ class PartPlace:
 def case_text(recorded: RecordedCase, places: Mapping[str, PartPlace], seed: int) -> str:
     """Write the case file of a simulated crash.
 
-    Parameters
-    ----------
-    places : mapping of str to PartPlace
-        By `part_file`.
-    seed : int
-        Seed of the simulation, for the file's number.
-
-    Returns
-    -------
-    str
-        TOML with the stated properties of the recorders, not their true errors.
+    `places`: by `part_file`. `seed`: seed of the simulation, for the file's number. Returns: TOML
+    with the stated properties of the recorders, not their true errors.
     """
     case, entry = recorded.case, recorded.entry
     summary = case.summary[0].upper() + case.summary[1:]

@@ -427,10 +427,7 @@ def apart_headline(result: CaseResult) -> str:
 def apart_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     """Return delta-V and direction of force for page one: the span of all bounds.
 
-    Parameters
-    ----------
-    result : CaseResult
-        Of recorders that disagree.
+    `result`: of recorders that disagree.
     """
     from strapdown.report.document import KeyFigure
 
@@ -510,17 +507,8 @@ def notes(
 ) -> tuple[tuple[str, str], ...]:
     """Return findings as items; files and recorders with the same finding share an item.
 
-    Parameters
-    ----------
-    result : CaseResult
-        Supplies the name of the recorders' mean.
-    remedies : bool
-        Whether each item includes its remedy.
-
-    Returns
-    -------
-    tuple of (str, str)
-        Location, and finding with its remedy.
+    `result`: supplies the name of the recorders' mean. `remedies`: whether each item includes its
+    remedy. Returns: location, and finding with its remedy.
     """
     combined = result.reconstruction.combined
     told: dict[tuple[str, str], list[str]] = {}
@@ -587,10 +575,7 @@ def _sentence(text: str) -> str:
 def record_facts(record: CrashRecord) -> tuple[tuple[str, str], ...]:
     """Return the test metadata of a record, with units.
 
-    Returns
-    -------
-    tuple of (str, str)
-        Empty if the record has only its file name.
+    Returns: empty if the record has only its file name.
     """
     rows = []
     if record.title and record.title != record.path.stem:
@@ -654,10 +639,7 @@ AGAINST = frozenset(
 def contradictions(result: CaseResult) -> tuple[tuple[str, str], ...]:
     """Return what speaks against the answers: references, records and the other vehicle.
 
-    Returns
-    -------
-    tuple of (str, str)
-        Source, and what it says.
+    Returns: source, and what it says.
     """
     rows = []
     for answer in result.references:
