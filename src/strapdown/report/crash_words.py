@@ -50,7 +50,7 @@ from strapdown.sensors.pre_crash import PreparedUnit
 from strapdown.tables import NED, VELOCITY
 
 if TYPE_CHECKING:
-    from strapdown.crash.closure import Closure
+    from strapdown.crash.closure import Closure, Figure
     from strapdown.report.document import KeyFigure
 
 TYPES = {
@@ -290,14 +290,16 @@ def closure_words(result: CaseResult) -> str:
     told = "closes" if closure.freedom else "could not be tested"
     parts = [f"With {other} momentum {told}"]
     if closure.closing_speed is not None:
-        figure, per = closure.closing_speed, speed_factor()
-        value, low, high = (plain(per * x, 1) for x in (figure.value, figure.low, figure.high))
-        parts.append(f"the closing speed was {value} {speed_unit()} ({low} to {high})")
+        speeds = _figure(closure.closing_speed, speed_factor(), 1, f" {speed_unit()}")
+        parts.append(f"the closing speed was {speeds}")
     if closure.restitution is not None:
-        figure = closure.restitution
-        value, low, high = (plain(x, 2) for x in (figure.value, figure.low, figure.high))
-        parts.append(f"the restitution {value} ({low} to {high})")
+        parts.append(f"the restitution {_figure(closure.restitution)}")
     return "; ".join(parts) + "."
+
+
+def _figure(figure: Figure, factor: float = 1.0, places: int = 2, unit: str = "") -> str:
+    value, low, high = (plain(factor * x, places) for x in (figure.value, figure.low, figure.high))
+    return f"{value}{unit} ({low} to {high})"
 
 
 def references_words(result: CaseResult) -> Iterator[str]:
@@ -352,9 +354,7 @@ def _barrier_words(result: CaseResult, closure: Closure) -> str:
         depth = length_about(crush.depth.value, crush.depth.half_width)
         parts.append(f"it was crushed by {at_least}{depth}")
     if closure.restitution is not None:
-        figure = closure.restitution
-        value, low, high = (plain(x, 2) for x in (figure.value, figure.low, figure.high))
-        parts.append(f"the restitution was {value} ({low} to {high})")
+        parts.append(f"the restitution was {_figure(closure.restitution)}")
     return f"Against the barrier {'; '.join(parts)}." if parts else ""
 
 
@@ -841,16 +841,16 @@ def clipping(result: CaseResult) -> Iterator[tuple[str, str, str]]:
             axes = [k for k in range(3) if clipped[:, k].any()]
             if axes:
                 rows = np.flatnonzero(clipped.any(axis=1))
-                names = ", ".join("xyz"[k] for k in axes)
+                letters = ", ".join("xyz"[k] for k in axes)
                 said = (
-                    f"{unit.name}: its axis {names}, {len(rows)} samples between "
+                    f"{unit.name}: its axis {letters}, {len(rows)} samples between "
                     f"{instant(time[rows[0]])} and {instant(time[rows[-1]])}"
                 )
                 cut[what].append((unit.name, said))
     for what, found in cut.items():
         if found:
-            names, spans = zip(*found, strict=True)
-            yield _limitation(f"clipped-{what}", names=", ".join(names), spans="; ".join(spans))
+            whose, spans = ", ".join(n for n, _ in found), "; ".join(s for _, s in found)
+            yield _limitation(f"clipped-{what}", names=whose, spans=spans)
 
 
 def assumed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
