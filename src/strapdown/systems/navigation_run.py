@@ -399,7 +399,8 @@ def _with_settled_offsets(
         findings, run = by_step, drive(chain)
     _, left = _with_offsets(chain, run.smoothed or run.record, before)
     code = "navigation.offset-not-settled"
-    unsettled = (Finding(code, quantity=f.quantity, left=before[f.quantity][1]) for f in left)
+    names = [str(one.quantity) for one in left]
+    unsettled = (Finding(code, quantity=name, left=before[name][1]) for name in names)
     return chain, run, (*findings, *unsettled)
 
 
