@@ -283,17 +283,7 @@ def points_picture(outline: Outline, changes: Sequence[PointChange]) -> Picture:
     alt = "Change of velocity at the measuring points: "
     alt += "; ".join(f"{name}: {words}" for name, words in told)
     out = Drawing(_WIDTH, top + bottom + _KEY_ROW * len(changes) + 28.0, alt)
-
-    def above(p: Sequence[float]) -> tuple[float, float]:
-        return (
-            centre[0] + scale * (p[1] - float(middle[1])),
-            centre[1] - scale * (p[0] - float(middle[0])),
-        )
-
-    def pixels(points: np.ndarray) -> np.ndarray:
-        return np.array([above(p) for p in points.tolist()], dtype=np.float64)
-
-    draw_outline(out, outline.mapped(pixels), _BODY, 1.4, fill="#eef1f5", opacity=1.0)
+    above = _from_above(out, outline, centre, scale)
     for one in changes:
         x, y = above(one.unit.position)
         tip = (x + per * one.delta_v[1], y - per * one.delta_v[0])
@@ -473,19 +463,14 @@ def conventions_picture(
     scale = min(_LONG / length, _ACROSS / width)
     middle = 0.5 * (low + high)
 
-    def above(p: Sequence[float]) -> tuple[float, float]:
-        return (
-            _TOP_VIEW[0] + scale * (p[1] - float(middle[1])),
-            _TOP_VIEW[1] - scale * (p[0] - float(middle[0])),
-        )
-
     def side(p: Sequence[float]) -> tuple[float, float]:
         return _SIDE_VIEW[0] + scale * (p[0] - float(middle[0])), _SIDE_VIEW[1] + scale * p[2]
 
     def behind(p: Sequence[float]) -> tuple[float, float]:
         return _REAR_VIEW[0] + scale * (p[1] - float(middle[1])), _REAR_VIEW[1] + scale * p[2]
 
-    _draw_above(out, outline, above, point)
+    above = _from_above(out, outline, _TOP_VIEW, scale)
+    _draw_clock(out, above(point))
     draw_side(out, outline, side, scale)
     draw_behind(out, outline, behind)
     for words, x, y in (
@@ -514,11 +499,25 @@ def _place(position: Sequence[float]) -> str:
     return "(" + ", ".join(values).replace("-", "−") + f") {length_unit()}"
 
 
-def _draw_above(out: Drawing, outline: Outline, view: Project, point: Sequence[float]) -> None:
+def _from_above(out: Drawing, outline: Outline, centre: Point, scale: float) -> Project:
+    """Draw a vehicle from above, its front upward, in pixels per m; return where positions are."""
+    middle = 0.5 * (outline.low + outline.high)
+
+    def above(p: Sequence[float]) -> tuple[float, float]:
+        return (
+            centre[0] + scale * (p[1] - float(middle[1])),
+            centre[1] - scale * (p[0] - float(middle[0])),
+        )
+
     def pixels(points: np.ndarray) -> np.ndarray:
-        return np.array([view(p) for p in points.tolist()], dtype=np.float64)
+        return np.array([above(p) for p in points.tolist()], dtype=np.float64)
 
     draw_outline(out, outline.mapped(pixels), _BODY, 1.4, fill="#eef1f5", opacity=1.0)
+    return above
+
+
+def _draw_clock(out: Drawing, target: Point) -> None:
+    """Draw the clock of the direction of force, with an example that pushes at a point."""
     centre = _TOP_VIEW
     out.circle(centre, _CLOCK, "#c3cad2", 1.0)
     for hour in range(1, 13):
@@ -526,7 +525,6 @@ def _draw_above(out: Drawing, outline: Outline, view: Project, point: Sequence[f
         out.line(*ends, _SOFT, 1.0)
         at = _at(centre, _CLOCK + 11.0, 30.0 * hour)
         out.text(at, str(hour), 10.5, INK, anchor="middle", bold=hour % 3 == 0)
-    target = view(point)
     reach = _CLOCK - 9.0
     tail = _at(centre, reach, _EXAMPLE)
     away = math.hypot(tail[0] - target[0], tail[1] - target[1])
