@@ -286,3 +286,19 @@ def test_where_the_way_does_not_decide_the_windows_do_or_nothing_does():
     assert found.certain
     assert found.size == pytest.approx(0.4)
     assert stamp_step(table, windows(0.0)) is None
+
+
+def test_windows_of_which_most_stray_show_neither_an_offset_nor_a_step():
+    """As of a boat in a stream: offsets that differ by ten of their standard deviations."""
+    begin = np.arange(5.0) * 65.0
+    spans = np.column_stack([begin, begin + 60.0])
+    sd = np.array([0.041, 0.038, 0.018, 0.032, 0.075])
+    scattered = Offsets(spans, np.array([-0.231, -0.561, -0.470, -0.125, -0.024]), sd)
+    assert scattered.joint() is None
+    assert scattered.step() is None
+    # One that strays has a fault of its own; a step is one to which all others agree.
+    stray = Offsets(spans, np.array([0.9, 0.49, 0.51, 0.5, 0.5]), sd)
+    assert stray.joint()[0] == pytest.approx(0.5, abs=0.02)
+    step = Offsets(spans, np.array([0.01, 0.0, -0.01, 0.61, 0.6]), sd).step()
+    assert step.size == pytest.approx(0.61, abs=0.02)
+    assert (step.after, step.before) == (130.0, 255.0)
