@@ -31,6 +31,7 @@ from strapdown.crash.structure import (
 )
 from strapdown.dsp.chi_square import chi_square_above
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
+from strapdown.formats.inference.rotation_rate import signed_permutations
 from strapdown.sensors.crash_unit import NO_GYRO
 from strapdown.tables.checks import Array
 
@@ -617,17 +618,6 @@ class AxisMatch:
         return "gyro" if gyro else "agree"
 
 
-def signed_permutations() -> Array:
-    """All 48 matrices with one ±1 in each row and column; 24 are rotations."""
-    found = []
-    for order in itertools.permutations(range(3)):
-        for signs in itertools.product((1.0, -1.0), repeat=3):
-            matrix = np.zeros((3, 3))
-            matrix[range(3), order] = signs
-            found.append(matrix)
-    return np.array(found)
-
-
 def match_axes(
     first: VelocityIncrements, second: VelocityIncrements, turned: Array | None = None
 ) -> AxisMatch:
@@ -644,7 +634,7 @@ def match_axes(
     is taken, and the identity where it fits with a probability of 1e-3 or more. Accelerometers and
     gyros are judged separately, since either may be wired wrong; a shared gyro is not judged.
     """
-    candidates = signed_permutations()
+    candidates = signed_permutations()[1]
     if turned is not None and (np.diag(turned) > math.cos(math.pi / 4.0)).all():
         candidates = np.concatenate([candidates, turned[None]])
     accel, lead, other = _best(first, second, "force", candidates)
@@ -688,17 +678,11 @@ def axis_findings(match: AxisMatch, first: str, second: str) -> list[Finding]:
     kind = match.kind
     if kind == "agree":
         return []
-    parts = {
-        "unit": [("unit", match.accelerometers, match.accelerometers_lead)],
-        "accelerometers": [("accelerometers", match.accelerometers, match.accelerometers_lead)],
-        "gyro": [("gyro", match.gyro, match.gyro_lead)],
-        "both": [
-            ("accelerometers", match.accelerometers, match.accelerometers_lead),
-            ("gyro", match.gyro, match.gyro_lead),
-        ],
-    }[kind]
     found: list[Finding] = []
-    for part, matrix, lead in parts:
+    for part in ("accelerometers", "gyro") if kind == "both" else (kind,):
+        of_gyro = part == "gyro"
+        matrix = match.gyro if of_gyro else match.accelerometers
+        lead = match.gyro_lead if of_gyro else match.accelerometers_lead
         moved = [
             Finding(
                 "crash.axis-opposite" if matrix[i, j] < 0 else "crash.axis-along",
@@ -1136,13 +1120,8 @@ def _against_all(
     size = increments[0].values.size
     if size == 0:
         none = np.full((kept.size + 1, 3), np.nan)
-        return (
-            none,
-            none,
-            tuple(UnitAgainstAll(u.name, none, none, 0.0, 0, 1.0) for u in units),
-            0.0,
-            0,
-        )
+        against_none = tuple(UnitAgainstAll(u.name, none, none, 0.0, 0, 1.0) for u in units)
+        return none, none, against_none, 0.0, 0
     joint = joint_covariance(increments)
     turning = _turning(units, structure, increments[0].edges, kept)
     if turning is not None:

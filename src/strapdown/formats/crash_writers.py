@@ -20,19 +20,16 @@ from strapdown.formats.crash_record import (
     clean,
     position_of,
 )
+from strapdown.formats.mme_codes import FILTERS, LENGTH, NO_CLASS, decode_mme
 from strapdown.formats.mme_reader import (
     AXIS_NOTE,
     BODY_NOTE,
     FILTER_NOTE,
-    FILTERS,
-    LENGTH,
-    NO_CLASS,
     NO_VEHICLE,
     PLACE_NOTE,
     POINT_NOTE,
     SAMPLING_NOTE,
     VEHICLE_NOTE,
-    decode_mme,
     even_stamps,
 )
 from strapdown.tables import ACCEL, EULER, GYRO, NED, POSITION_SD, VELOCITY

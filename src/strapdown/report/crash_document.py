@@ -125,14 +125,9 @@ def unit_signals(
 ) -> list[Chart]:
     """Chart the record of a unit: as a whole, specific force and rates about the crash.
 
-    Parameters
-    ----------
-    recorded : CrashUnit
-        On its own clock; without a gyro of its own it has no chart of rates.
-    number : int
-        Index of the unit, from 0; sets its color.
-    events : sequence of CrashEvent
-        Events of the crash, from the mean of the units.
+    `recorded`: on its own clock; without a gyro of its own it has no chart of rates. `number`:
+    index of the unit, from 0; sets its color. `events`: events of the crash, from the mean of the
+    units.
     """
     prepared = unit.at_point.prepared
     if prepared is None:
@@ -375,14 +370,9 @@ def place_chart(
 ) -> Chart:
     """Chart the position of the reference point over time.
 
-    Parameters
-    ----------
-    names : (str, str)
-        Of the first two axes of the path.
-    samples : PathSamples, optional
-        Monte Carlo samples, whose 95 % bounds are drawn beside the linear ones.
-    reference : DataFrame, optional
-        ``north east down`` in the axes of the path, m, indexed by time.
+    `names`: of the first two axes of the path. `samples`: Monte Carlo samples, whose 95 % bounds
+    are drawn beside the linear ones. `reference`: ``north east down`` in the axes of the path, m,
+    indexed by time.
     """
     labels = [f"{name}, m" for name in (*names, "down")]
     chart = _over_time(
@@ -448,14 +438,8 @@ def reference_chart(
 ) -> Chart:
     """Chart the difference of the path from a reference, with its bound.
 
-    Parameters
-    ----------
-    name : str
-        Of the reference.
-    names : (str, str)
-        Of the first two axes of the path.
-    number : int
-        Index of the reference, for the file name.
+    `name`: of the reference. `names`: of the first two axes of the path. `number`: index of the
+    reference, for the file name.
     """
     time = 1e3 * index_of(comparison.errors)
     panels = []
@@ -876,17 +860,8 @@ def _findings(result: CaseResult) -> tuple[Block | None, ...]:
 def reference_in_path_axes(path: CrashPath, answer: ReferenceAnswer) -> pd.DataFrame:
     """Positions of a reference path, shifted to agree with the reconstruction at the entry.
 
-    Parameters
-    ----------
-    path : CrashPath
-        Reconstructed path of the comparison.
-    answer : ReferenceAnswer
-        Answer with a reference path.
-
-    Returns
-    -------
-    DataFrame
-        ``north east down``, m, indexed by time, s, as used in the comparison.
+    `path`: reconstructed path of the comparison. `answer`: answer with a reference path. Returns:
+    ``north east down``, m, indexed by time, s, as used in the comparison.
     """
     assert answer.path is not None
     errors = answer.path.errors

@@ -82,23 +82,10 @@ def path_plan(
 ) -> Picture:
     """Draw a path from above.
 
-    Parameters
-    ----------
-    outline : Outline
-        In vehicle axes.
-    point : sequence of float, m
-        Reference point of the path, in vehicle axes.
-    names : (str, str)
-        Of the first two axes of the path.
-    reference : DataFrame, optional
-        ``north east`` of the point in the axes of the path, m, indexed by time.
-    small : bool
-        Draw for half a page width, with letters as large as at the whole width.
-
-    Returns
-    -------
-    Picture
-        A path short against the vehicle is also drawn enlarged, if the width permits.
+    `outline`: in vehicle axes. `point`, m: reference point of the path, in vehicle axes. `names`:
+    of the first two axes of the path. `reference`: ``north east`` of the point in the axes of the
+    path, m, indexed by time. `small`: draw for half a page width, with letters as large as at the
+    whole width. A path short against the vehicle is also drawn enlarged, if the width permits.
     """
     plan = _plan(path, events, reference)
     whole = _SMALL_WIDTH if small else _WIDTH
@@ -306,17 +293,10 @@ _FOOT = 18.0
 class PlanFrame:
     """Mapping of a level plane to a picture.
 
-    Attributes
-    ----------
-    left, top, width, height : float
-        Of the frame, in pixels.
-    middle : (float, float), m
-        First and second coordinate (north and east, or forward and right) of the frame's middle.
-    scale : float
-        Pixels per meter.
-    names : (str, str)
-        Of the two coordinates. North is drawn up and east to the right; forward to the right and
-        right downward, which is the same plane rotated by a quarter turn, seen from above.
+    `left`, `top`, `width`, `height`: of the frame, in pixels. `middle`, m: first and second
+    coordinate (north and east, or forward and right) of the frame's middle. `scale`: pixels per
+    meter. `names`: of the two coordinates. North is drawn up and east to the right; forward to the
+    right and right downward, which is the same plane rotated by a quarter turn, seen from above.
     """
 
     left: float
@@ -344,16 +324,8 @@ class PlanFrame:
     ) -> PlanFrame:
         """The largest view that contains all points.
 
-        Parameters
-        ----------
-        points : ndarray, (n, 2), m
-        names : (str, str)
-        at : (float, float)
-            Upper left corner of the frame.
-        heights : (float, float)
-            Minimum and maximum height of the frame.
-        margin : float
-            Pixels around the points.
+        `points`, (n, 2), m. `at`: upper left corner of the frame. `heights`: minimum and maximum
+        height of the frame. `margin`: pixels around the points.
         """
         finite = points[np.isfinite(points).all(axis=1)]
         low, high = (finite.min(axis=0), finite.max(axis=0)) if len(finite) else (-np.ones(2),) * 2
@@ -449,21 +421,9 @@ def path_animation(
 ) -> Animation:
     """Animate the vehicle along its path with its attitude.
 
-    Parameters
-    ----------
-    outline : Outline
-        In vehicle axes.
-    point : sequence of float, (3,), m
-        Reference point of the path, in vehicle axes.
-    names : (str, str)
-        Of the first two axes of the path.
-    reference : DataFrame, optional
-        ``north east down`` of the point in the axes of the path, m.
-
-    Returns
-    -------
-    Animation
-        At most `MOST_FRAMES` frames, at samples of the path.
+    `outline`: in vehicle axes. `point`, (3,), m: reference point of the path, in vehicle axes.
+    `names`: of the first two axes of the path. `reference`: ``north east down`` of the point in the
+    axes of the path, m. Returns: at most `MOST_FRAMES` frames, at samples of the path.
     """
     body = vehicle_body(outline)
     rows = np.unique(
@@ -582,17 +542,8 @@ def crash_stills(
 ) -> Picture:
     """Draw the vehicle at up to six instants of its path.
 
-    Parameters
-    ----------
-    point : sequence of float, (3,), m
-        Reference point in vehicle axes.
-    ground : float, m
-        Down coordinate of the drawn ground, in the axes of the path.
-
-    Returns
-    -------
-    Picture
-        All views have one scale.
+    `point`, (3,), m: reference point in vehicle axes. `ground`, m: down coordinate of the drawn
+    ground, in the axes of the path. All views have one scale.
     """
     places = path.table[NED].to_numpy(dtype=np.float64)
     instants = _instants(path, events)
@@ -714,16 +665,9 @@ _SIDE, _COVER, _GLASS, _FRONT = "#9fb3c8", "#cdd8e2", "#3d5166", "#D55E00"
 class VehicleBody:
     """Corners and faces of a vehicle body.
 
-    Attributes
-    ----------
-    corners : ndarray, (n, 3), m
-        Vehicle axes forward, right, down, from the vehicle's origin.
-    faces : tuple of tuple of int
-        Corner indices of each face.
-    colours : tuple of str
-        One per face.
-    cabin : int
-        Number of faces, at the end, that belong to a cabin on top of the body.
+    `corners`, (n, 3), m: vehicle axes forward, right, down, from the vehicle's origin. `faces`:
+    corner indices of each face. `colours`: one per face. `cabin`: number of faces, at the end, that
+    belong to a cabin on top of the body.
     """
 
     corners: Array = field(repr=False)
@@ -739,12 +683,8 @@ class VehicleBody:
     def seen(self, corners: Array, away: Array) -> list[int]:
         """Visible faces, farthest first, for any attitude of the body.
 
-        Parameters
-        ----------
-        corners : ndarray, (n, 3), m
-            As returned by `placed`.
-        away : ndarray, (3,)
-            Viewing direction, in the same axes.
+        `corners`, (n, 3), m: as returned by `placed`. `away`, (3,): viewing direction, in the same
+        axes.
         """
         lower = range(len(self.faces) - self.cabin)
         upper = range(len(self.faces) - self.cabin, len(self.faces))
@@ -766,13 +706,8 @@ class VehicleBody:
     def placed(self, at: ArrayLike, q_nb: ArrayLike, point: ArrayLike) -> Array:
         """Corners in the axes of the path, (n, 3), m.
 
-        Parameters
-        ----------
-        at : array_like, (3,), m
-            Position of `point`.
-        q_nb : array_like, (4,)
-        point : array_like, (3,), m
-            Of the vehicle, in vehicle axes.
+        `at`, (3,), m: position of `point`. `q_nb`, (4,). `point`, (3,), m: of the vehicle, in
+        vehicle axes.
         """
         arms = self.corners - np.asarray(point, dtype=np.float64)
         return np.asarray(rotation.rotate(q_nb, arms) + np.asarray(at, dtype=np.float64))
@@ -781,10 +716,7 @@ class VehicleBody:
 def vehicle_body(outline: Outline) -> VehicleBody:
     """Make a body from an outline: a car with a cabin, or a plain body for a stated outline.
 
-    Parameters
-    ----------
-    outline : Outline
-        In vehicle axes.
+    `outline`: in vehicle axes.
     """
     ring = hull(outline.body)
     if len(ring) > _RING:

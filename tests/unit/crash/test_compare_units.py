@@ -25,13 +25,13 @@ from strapdown.crash.consistency import (
     compare_units,
     difference_covariance,
     joint_covariance,
-    signed_permutations,
     velocity_increments,
 )
 from strapdown.crash.measuring_point import SampleEffects, at_point
 from strapdown.crash.preparation import prepare_together
 from strapdown.crash.structure import unlearnt
 from strapdown.errors import ConfigError, DataError
+from strapdown.formats.inference.rotation_rate import signed_permutations
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.pre_crash import Levelling, PreparedUnit
 from strapdown.sensors.synchronise import synchronise
@@ -196,7 +196,7 @@ def test_more_bias_than_stated_is_a_disagreement_with_words():
 @pytest.mark.slow
 @pytest.mark.parametrize("index", range(48))
 def test_every_signed_permutation_of_the_accelerometers_is_recognised(index):
-    wrong = signed_permutations()[index]
+    wrong = signed_permutations()[1][index]
     # The second unit reads its own axes: v_read = wrongᵀ v, so wrong turns it back.
     out = compare_units([unit("A", A, 1), unit("B", B, 2, accel_axes=wrong)])
     match = out.pairs[0].axes
@@ -222,7 +222,7 @@ def test_a_unit_turned_as_a_whole_and_a_gyro_turned_alone():
 
 @pytest.mark.parametrize(("index", "agree"), [(5, False), (47, False), (None, True)])
 def test_without_an_explanation_the_verdict_is_the_same(index, agree):
-    axes = np.eye(3) if index is None else signed_permutations()[index]
+    axes = np.eye(3) if index is None else signed_permutations()[1][index]
     pair = unit("A", A, 1), unit("B", B, 2, accel_axes=axes)
     edges = common_edges(pair)
     a, b = (velocity_increments(u, edges) for u in pair)

@@ -9,7 +9,8 @@ from tests.coded import coded
 from strapdown.errors import DataError
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_triad import triad_of_channels
-from strapdown.formats.mme_reader import decode_mme, even_stamps
+from strapdown.formats.mme_codes import decode_mme
+from strapdown.formats.mme_reader import even_stamps
 
 HEAD = "11HEAD0000H3ACXA"
 CAR = "10VEHC0000CGAVZC"
