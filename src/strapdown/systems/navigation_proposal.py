@@ -120,9 +120,10 @@ LEVELLED, LEVELLED_IN_MOTION = 10.0, 2.0
 #: Standard deviations that end an alignment by course, deg: of the tilt; and of the heading, which
 #: has that of the mounting of the unit, 5 deg, besides.
 WELL, HEADING = 3.0, 6.0
-#: Trials of it: factor of the length from trial to trial, margin over the best of them, and the
-#: largest standard deviation that is not too large for a linear filter, deg.
-LATER, MARGIN, LARGEST_START = 1.15, 1.2, 15.0
+#: Trials of it: factor of the length from trial to trial, margin over them, as arm and standard
+#: deviations that are answered later change it, and the largest standard deviation that is not too
+#: large for a linear filter, deg.
+LATER, MARGIN, LARGEST_START = 1.15, 2.0, 15.0
 #: Longest part of a record to align by course as a whole, s, so that navigation begins with it; the
 #: least one, and how much later than possible.
 MOST_BACK, LEAST_BACK, MORE = 300.0, 60.0, 30.0
@@ -713,8 +714,9 @@ def _receiver_errors(fixes: pd.DataFrame, imu: pd.DataFrame, delay: float) -> di
 
 
 def _antenna(aid: dict[str, Any], delay: float | None = None) -> Antenna:
-    """Delay and correlated errors of a proposed receiver; `delay`, s, if it is not as proposed."""
+    """Of a proposed receiver, what an alignment uses; `delay`, s, if it is not as proposed."""
     return Antenna(
+        time_offset_sd=aid.get("time_offset_sd_s", 0.0),
         velocity_delay=aid.get("velocity_delay_s", 0.0) if delay is None else delay,
         correlated_share=aid.get("position_correlated_share", 0.0),
         correlation_time=LASTING,
@@ -923,7 +925,8 @@ def _tried(
     instant allows an alignment, the heading is asked, and a finding gives the reason.
     """
     coarse, antenna = chosen["coarse"], _antenna(clock)
-    limits = coarse["until_heading_sd_deg"], coarse["until_tilt_sd_deg"]
+    keys = ("until_heading_sd_deg", "until_tilt_sd_deg")
+    limits = tuple(coarse[key] for key in keys)
     time = index_of(imu)
     site = Site(*np.median(values_of(fixes, GEODETIC), axis=0).tolist())
     attrs, fixes = dict(fixes.attrs), fixes.set_axis(fixes.index - clock.get("time_offset_s", 0.0))
@@ -940,7 +943,7 @@ def _tried(
         roll, pitch, heading = np.maximum(found.sd_deg_to_begin, found.sd_deg).tolist()
         return heading, max(roll, pitch)
 
-    best: tuple[float, float] | None = None
+    best, at = (math.inf, math.inf), 0.0
     refused: Finding | None = None
     span, length = float(time[-1] - time[0]), 2.0
     while True:
@@ -949,21 +952,21 @@ def _tried(
             sd = after(length)
             if sd[0] <= limits[0] and sd[1] <= limits[1]:
                 length = _later(length, span, after, limits)
-                return {**chosen, "coarse": {**coarse, "least_s": length}}, how, ()
-            if best is None or max(sd) < max(best):
-                best = sd
+                met = dict(zip(keys, (MARGIN * one for one in limits), strict=True))
+                return {**chosen, "coarse": {**coarse, **met, "least_s": length}}, how, ()
+            if max(sd) < max(best):
+                best, at = sd, length
         except (DataError, DivergenceError) as error:
             refused = error.finding
         if length >= span:
             break
         length = float(math.ceil(length * LATER))
-    if best is not None and max(best) < LARGEST_START:
-        wider = [max(a, math.ceil(MARGIN * b)) for a, b in zip(limits, best, strict=True)]
-        keys = ("until_heading_sd_deg", "until_tilt_sd_deg")
-        coarse = {**coarse, **dict(zip(keys, wider, strict=True))}
+    if max(best) < LARGEST_START:
+        wider = (min(MARGIN * max(one), LARGEST_START) for one in zip(limits, best, strict=True))
+        coarse = {**coarse, **dict(zip(keys, map(math.ceil, wider), strict=True)), "least_s": at}
         return {**chosen, "coarse": coarse}, f"{how}; no better than within {max(best):.2g} deg", ()
     most = {"kind": "known_heading", "duration_s": levelled}
-    reason = refused or Finding("navigation.course-too-uncertain", sd=max(best or (math.inf,)))
+    reason = refused or Finding("navigation.course-too-uncertain", sd=max(best))
     return (
         {"coarse": most, "fine": {"kind": "none"}},
         "the fixes do not give the attitude, by the reason that is reported: the heading is asked",

@@ -108,8 +108,9 @@ RECOVERIES = 4
 #: An estimated time offset, s, over which a run is repeated with it, and by how many of its
 #: standard deviations it differs from zero.
 CONTINUED, SURELY = 0.05, 3.0
-#: How often at most: by a second, states of sensors take a part of it, and each run finds the rest.
-STEPS_OF_OFFSET = 4
+#: How often at most: by a second, states of sensors take a part of it, and each run finds some of
+#: the rest, of which the part found is taken to be at least the second.
+STEPS_OF_OFFSET, LEAST_PART = 10, 0.25
 #: A run is repeated with the offset that it found, known to so many of its standard deviations,
 #: where that is at most this part of what was assumed, and where the assumed one moves the vehicle,
 #: at the speed that is exceeded for a tenth of the time, by so many standard deviations of fixes.
@@ -190,13 +191,7 @@ def run_navigation(
     progress("aligning" if spec.start is None else "navigating", BEGUN)
     with said_of_file(*tables):
         run = again(chain)
-        by_offset: tuple[Finding, ...] = ()
-        for _ in range(STEPS_OF_OFFSET):
-            chain, by_step = _with_offsets(chain, run.smoothed or run.record)
-            if not by_step:
-                break
-            by_offset = by_step
-            run = again(chain)
+        chain, run, by_offset = _with_settled_offsets(chain, run, again)
         chain, run, by_displacement = _without_displacements(chain, run, source.tables, again)
         begun_with = chain
         if not by_offset and run.smoothed is None:
@@ -391,13 +386,33 @@ def _turns(euler: NDArray[np.float64]) -> NDArray[np.float64]:
     )
 
 
+def _with_settled_offsets(
+    chain: NavigationPipeline, run: PipelineRun, drive: Callable[[NavigationPipeline], PipelineRun]
+) -> tuple[NavigationPipeline, PipelineRun, tuple[Finding, ...]]:
+    """Repeat a run with the time offsets that it estimates until these are small."""
+    findings: tuple[Finding, ...] = ()
+    before: dict[str, tuple[float, float]] = {}
+    for _ in range(STEPS_OF_OFFSET):
+        chain, by_step = _with_offsets(chain, run.smoothed or run.record, before)
+        if not by_step:
+            return chain, run, findings
+        findings, run = by_step, drive(chain)
+    _, left = _with_offsets(chain, run.smoothed or run.record, before)
+    code = "navigation.offset-not-settled"
+    names = [str(one.quantity) for one in left]
+    unsettled = (Finding(code, quantity=name, left=before[name][1]) for name in names)
+    return chain, run, (*findings, *unsettled)
+
+
 def _with_offsets(
-    chain: NavigationPipeline, record: NavigationRecord
+    chain: NavigationPipeline, record: NavigationRecord, before: dict[str, tuple[float, float]]
 ) -> tuple[NavigationPipeline, tuple[Finding, ...]]:
     """Return a pipeline that begins with the estimated time offsets, where these are large.
 
     A fix is compared with the motion at its stamp, continued over the offset by velocity and mean
-    acceleration: over `CONTINUED` a walk's steps move by more than a centimeter otherwise.
+    acceleration: over `CONTINUED` a walk's steps move by more than a centimeter otherwise. Biases
+    and tilt explain a part of a large one, in each run alike: by the error that was left `before`,
+    with another offset, the secant says which.
     """
     aids: list[Measurement] = []
     findings: list[Finding] = []
@@ -406,7 +421,13 @@ def _with_offsets(
             name = f"{aid.name}.time_offset_t"
             error, sd = (float(of[name].iloc[-1]) for of in (record.sensors, record.sensors_sd))
             if abs(error) > max(CONTINUED, SURELY * sd):
-                aid = replace(aid, time_offset=aid.time_offset - error)
+                part = 1.0
+                if name in before:
+                    offset, other = before[name]
+                    part = (other - error) / (offset - aid.time_offset)
+                before[name] = aid.time_offset, error
+                step = error / min(max(part, LEAST_PART), 1.0)
+                aid = replace(aid, time_offset=aid.time_offset - step)
                 add_note(
                     findings,
                     "navigation.run-again-with-offset",

@@ -18,7 +18,14 @@ from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.recorder import FullRecorder, _contradictions, record_of
 from strapdown.navigation.smoother import RauchTungStriebel
 from strapdown.navigation.truth_comparison import compare_with_truth
-from strapdown.systems.navigation_run import ASSUMED, _with_known_offsets, _with_offsets
+from strapdown.systems.navigation_run import (
+    ASSUMED,
+    CONTINUED,
+    STEPS_OF_OFFSET,
+    _with_known_offsets,
+    _with_offsets,
+    _with_settled_offsets,
+)
 from strapdown.tables import GEODETIC, VELOCITY, VELOCITY_SD
 
 
@@ -351,7 +358,7 @@ def test_a_run_begins_again_with_a_large_offset(error, sd, offset):
     record = SimpleNamespace(
         sensors=pd.DataFrame({name: [0.0, error]}), sensors_sd=pd.DataFrame({name: [0.2, sd]})
     )
-    after, findings = _with_offsets(chain, record)
+    after, findings = _with_offsets(chain, record, {})
     if offset is None:
         assert after is chain
         assert not findings
@@ -359,3 +366,37 @@ def test_a_run_begins_again_with_a_large_offset(error, sd, offset):
         assert after.navigator.aids[0].time_offset == pytest.approx(offset)
         assert [one.code for one in findings] == ["navigation.run-again-with-offset"]
         assert math.isclose(findings[0].data["offset"], offset)
+
+
+@pytest.mark.parametrize(
+    ("part", "runs"), [(1.0, 2), (0.4, 3), (0.1, STEPS_OF_OFFSET), (0.0, STEPS_OF_OFFSET)]
+)
+def test_runs_are_repeated_until_the_offset_they_find_is_small(part, runs):
+    """Each run finds a part of an offset of 0.76 s; two tell which part, of a quarter or more.
+
+    A run that finds a constant, whatever was assumed, never settles, and says so.
+    """
+    navigator, _ = town.begun(town.gnss(time_offset_sd=0.2))
+    name, true = "gnss.time_offset_t", -0.76
+    assumed = []
+
+    def drive(chain):
+        assumed.append(chain.navigator.aids[0].time_offset)
+        error = part * (assumed[-1] - true) if part else 0.3
+        record = SimpleNamespace(
+            sensors=pd.DataFrame({name: [error]}), sensors_sd=pd.DataFrame({name: [0.001]})
+        )
+        return SimpleNamespace(smoothed=None, record=record)
+
+    chain = SimpleChain(navigator)
+    after, _, findings = _with_settled_offsets(chain, drive(chain), drive)
+    codes = [one.code for one in findings]
+    assert "navigation.run-again-with-offset" in codes
+    assert len(assumed) <= runs + 1
+    offset = after.navigator.aids[0].time_offset
+    if part:
+        assert abs(part * (offset - true)) <= CONTINUED
+        assert len(codes) == 1
+    else:
+        assert codes[-1] == "navigation.offset-not-settled"
+        assert findings[-1].data["left"] == 0.3

@@ -41,6 +41,9 @@ AGREES = 0.3
 #: A window beyond so many standard deviations of the others has a fault of its own; a step of the
 #: clock is found from so many, from this size, s, and from so many windows on each side.
 STRAYS, CLEAR, LEAST_STEP, SIDE = 4.0, 6.0, 0.2, 2
+#: Part of the windows that agrees, at least: where more stray, it is the model that is wrong, as of a
+#: boat in a stream, whose course is not its heading.
+MAJORITY = 2.0 / 3.0
 #: Two estimates of an offset agree within so many standard deviations.
 AGREED = 3.0
 #: Stamps are regular where all but a few intervals are whole multiples of the usual one, to this
@@ -84,7 +87,7 @@ class Offsets:
 
         A part of the errors is common to the windows, as those of biases: what their scatter lacks
         of their standard deviations. It does not fall with their number. None without two windows
-        that agree.
+        that agree, and a `MAJORITY`.
         """
         if len(self.offset) < 2:
             return None
@@ -92,7 +95,7 @@ class Offsets:
         part = np.cumsum(self.sd[order] ** -2)
         middle = float(self.offset[order][np.searchsorted(part, 0.5 * part[-1])])
         used = np.abs(self.offset - middle) < STRAYS * np.maximum(self.sd, np.median(self.sd))
-        if used.sum() < 2:
+        if used.sum() < max(2.0, MAJORITY * len(used)):
             return None
         weight = self.sd[used] ** -2
         offset = float(weight @ self.offset[used] / weight.sum())
@@ -115,7 +118,7 @@ class Offsets:
         return rate, float(np.sqrt(scatter / spread))
 
     def step(self) -> ClockStep | None:
-        """The most likely single step, if it is significant."""
+        """The most likely single step, if it is significant beside the scatter about it."""
         best, found = np.inf, None
         for k in range(SIDE, len(self.offset) - SIDE + 1):
             left = Offsets(self.spans[:k], self.offset[:k], self.sd[:k]).joint()
@@ -126,7 +129,8 @@ class Offsets:
             far = np.abs(self.offset - level) / self.sd
             cost = float(np.minimum(np.square(far), STRAYS**2).sum())
             if cost < best:
-                sd = float(np.hypot(left[1], right[1]))
+                scatter = max(1.0, cost / (len(far) - 2))
+                sd = float(np.sqrt(scatter * (left[1] ** 2 + right[1] ** 2)))
                 best = cost
                 found = ClockStep(right[0] - left[0], sd, self.spans[k - 1, 0], self.spans[k, 1])
         if found is None or abs(found.size) < max(CLEAR * found.sd, LEAST_STEP):
@@ -299,7 +303,7 @@ def stamp_step(
     usual, lone = _irregular(steps)
     if usual is None:
         return None
-    lost = ~lone & (np.round(steps / usual) > 1.0) & (steps < min(SHORT * usual, SHORT_S))
+    lost = ~lone & (np.round(steps / usual) > 1.0) & (steps < SHORT_S)
     ways = _Ways(gnss, usual)
     for k in np.flatnonzero(lone | lost).tolist():
         found = _stamp_step(ways, k, bool(lone[k]), windows)

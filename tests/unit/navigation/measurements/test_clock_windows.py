@@ -227,6 +227,7 @@ def on_the_way(speed, rate=1.0, noise=1.0, *, size=0.0, at=100.0, lost=(), later
         (5.0, 0.02, -0.9),
         (10.0, 0.01, 0.788),
         (1.0, 0.1, 1.0),
+        (10.0, 0.01, 0.7),
         (4.0, 0.01, -0.059),
         (4.0, 0.3, -0.222),
     ],
@@ -251,6 +252,8 @@ def test_what_is_no_step_of_a_clock_is_none(seed):
         on_the_way(15.0, seed=seed),
         # Lost fixes, one of them alone; a receiver that begins anew at other instants.
         on_the_way(15.0, lost=[(40.0, 41.0), (60.0, 63.0), (90.0, 97.0)], seed=seed),
+        on_the_way(15.0, 10.0, 0.02, lost=[(40.0, 40.7), (60.0, 62.3), (90.0, 92.8)], seed=seed),
+        on_the_way(15.0, 10.0, 0.5, lost=[(40.0, 40.7), (60.0, 62.3), (90.0, 92.8)], seed=seed),
         on_the_way(15.0, noise=0.5, later=0.6, seed=seed),
         on_the_way(15.0, 5.0, 0.02, later=0.07, seed=seed),
     ):
@@ -283,3 +286,19 @@ def test_where_the_way_does_not_decide_the_windows_do_or_nothing_does():
     assert found.certain
     assert found.size == pytest.approx(0.4)
     assert stamp_step(table, windows(0.0)) is None
+
+
+def test_windows_of_which_most_stray_show_neither_an_offset_nor_a_step():
+    """As of a boat in a stream: offsets that differ by ten of their standard deviations."""
+    begin = np.arange(5.0) * 65.0
+    spans = np.column_stack([begin, begin + 60.0])
+    sd = np.array([0.041, 0.038, 0.018, 0.032, 0.075])
+    scattered = Offsets(spans, np.array([-0.231, -0.561, -0.470, -0.125, -0.024]), sd)
+    assert scattered.joint() is None
+    assert scattered.step() is None
+    # One that strays has a fault of its own; a step is one to which all others agree.
+    stray = Offsets(spans, np.array([0.9, 0.49, 0.51, 0.5, 0.5]), sd)
+    assert stray.joint()[0] == pytest.approx(0.5, abs=0.02)
+    step = Offsets(spans, np.array([0.01, 0.0, -0.01, 0.61, 0.6]), sd).step()
+    assert step.size == pytest.approx(0.61, abs=0.02)
+    assert (step.after, step.before) == (130.0, 255.0)
