@@ -41,7 +41,7 @@ AGREES = 0.3
 #: A window beyond so many standard deviations of the others has a fault of its own; a step of the
 #: clock is found from so many, from this size, s, and from so many windows on each side.
 STRAYS, CLEAR, LEAST_STEP, SIDE = 4.0, 6.0, 0.2, 2
-#: Part of the windows that agrees, at least: where more stray, it is the model that is wrong, as of a
+#: Part of the windows that agrees, at least: where more stray, the model is wrong, as of a
 #: boat in a stream, whose course is not its heading.
 MAJORITY = 2.0 / 3.0
 #: Two estimates of an offset agree within so many standard deviations.
