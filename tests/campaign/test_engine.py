@@ -20,7 +20,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from strapdown.campaign import dataset
+from strapdown.campaign import run as campaign_run
 from strapdown.campaign.case_process import CaseProcess
 from strapdown.campaign.engine import Workers
 from strapdown.campaign.run import (
@@ -316,21 +316,21 @@ def test_a_full_disk_loses_nothing_that_was_written(
 ) -> None:
     file = written(cheap, DRAWN.format(draws=200))
     run_campaign(file, workers=1).save(cheap / "whole", report=False)
-    plain = dataset.Dataset.add
+    plain = campaign_run.Dataset.add
     calls = []
 
-    def full(self: dataset.Dataset, rows: list[object]) -> None:
+    def full(self: campaign_run.Dataset, rows: list[object]) -> None:
         calls.append(len(rows))
         if len(calls) == 2:
             raise OSError(errno.ENOSPC, "no space left on device")
         plain(self, rows)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(dataset.Dataset, "add", full)
+    monkeypatch.setattr(campaign_run.Dataset, "add", full)
     monkeypatch.setattr("strapdown.campaign.run.SECONDS", 0.0)
     monkeypatch.setattr("strapdown.campaign.engine.MOST", 20)
     with pytest.raises(OSError, match="no space"):
         run_campaign(file, workers=1, folder=cheap / "c-running")
-    monkeypatch.setattr(dataset.Dataset, "add", plain)
+    monkeypatch.setattr(campaign_run.Dataset, "add", plain)
     found = open_campaign(cheap / "c").dataset.there().sum()
     assert 0 < found < 200
     resume(cheap / "c-running", workers=Workers(1)).save(cheap / "again", report=False)

@@ -20,7 +20,7 @@ from tests.campaign_cases import (
     ishigami,
 )
 
-from strapdown.campaign import dataset
+from strapdown.campaign import run as campaign_run
 from strapdown.campaign.run import Stopping
 from strapdown.campaign.summary import LEVELS, summarise
 
@@ -227,8 +227,8 @@ def test_half_widths_for_stopping() -> None:
 
 def test_rows_are_read_in_order_once_and_a_window_at_a_time(tmp_path, monkeypatch):
     """Of parts in any order, that overlap and repeat each other; blocks have the same bytes."""
-    monkeypatch.setattr(dataset, "WINDOW", 16)
-    monkeypatch.setattr(dataset, "BLOCK", 48)
+    monkeypatch.setattr(campaign_run, "WINDOW", 16)
+    monkeypatch.setattr(campaign_run, "BLOCK", 48)
     frozen = {
         "base": {},
         "parameters": [],
@@ -260,7 +260,7 @@ def test_rows_are_read_in_order_once_and_a_window_at_a_time(tmp_path, monkeypatc
         }
 
     def written(name, parts):
-        made = dataset.Dataset.begin(tmp_path / name, frozen)
+        made = campaign_run.Dataset.begin(tmp_path / name, frozen)
         for part in parts:
             made.add([row(case) for case in part])
         return made

@@ -118,6 +118,42 @@ def test_options_of_fixes_are_those_of_the_file_of_fixes(log, with_fixes, run_cl
     assert done.code == 0, done.err
 
 
+@pytest.mark.parametrize("form", ["gpx", "csv"])
+def test_what_fixes_leave_open_is_asked_of_the_log_that_needs_them(log, run_cli, tmp_path, form):
+    """A height over the sea alone was open, and `doctor` said that the log had no fixes."""
+    path = tmp_path / f"walk.{form}"
+    if form == "gpx":
+        points = "".join(
+            f'<trkpt lat="{50 + 1e-5 * k:.6f}" lon="30"><ele>100</ele>'
+            f"<time>2024-03-05T12:00:{k:02d}Z</time></trkpt>"
+            for k in range(60)
+        )
+        path.write_text(
+            '<gpx version="1.1" xmlns="http://www.topografix.com/GPX/1/1"><trk><trkseg>'
+            f"{points}</trkseg></trk></gpx>"
+        )
+    else:
+        rows = (f"{k},{50 + 1e-5 * k:.6f},30,100" for k in range(60))
+        path.write_text("\n".join(["time,lat,lon,alt_msl", *rows]) + "\n")
+    done = run_cli("doctor", log, path, "--out", tmp_path / "out")
+    assert done.code == 0, done.err
+    assert f"{path.name}, alt: " in done.out and " FIXES" not in done.out
+    found = {
+        one["name"]: one for one in json.loads((tmp_path / "out/doctor.json").read_text())["logs"]
+    }
+    reasons = [reason["code"] for reason in found["log.csv"]["fit"]["navigation"]["reasons"]]
+    assert "io.height-over-sea-column" in reasons and "doctor.no-fixes" not in reasons
+    assert run_cli("verify", tmp_path / "out").code == 0
+    asked = [x.partition(": ")[2] for x in done.out.splitlines() if ": strapdown doctor" in x]
+    inferred = "--gyro-unit rad/s --repair --gnss-datum-height 0"
+    assert asked == [f"strapdown doctor {log} {path} {inferred}"]
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert f"strapdown doctor log.csv {path.name} {inferred}" in page
+    again = run_cli(*shlex.split(asked[0])[1:], "--json", "--out", tmp_path / "again")
+    first = json.loads(again.out)["logs"][0]
+    assert first["fixes_from"] == path.name and not first["questions"]
+
+
 def test_options_of_fixes_that_no_file_has_are_refused(log, with_fixes, run_cli, tmp_path):
     for logs in ((log,), (log, with_fixes), (with_fixes, log)):
         done = run_cli("doctor", *logs, "--gnss-columns", "lat=y", "--out", tmp_path / "out")

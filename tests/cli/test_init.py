@@ -198,3 +198,24 @@ def test_a_test_of_two_vehicles_gives_a_case_for_each(run_cli, tmp_path):
     assert "channels 10, 11, 12: it moves with the engine" in done.out
     assert "channels 13, 14, 15: it moves with the driver's head" in done.out
     assert done.out.rstrip().endswith(f"Then   strapdown crash {files[0]} {files[1]}")
+
+
+def test_columns_named_by_codes_of_iso_mme(run_cli, tmp_path):
+    """A head was taken for the vehicle, the vehicle for its gyro, and a yaw rate for x."""
+    time = np.arange(-0.05, 0.2, 1e-4)
+    pulse = np.where((time > 0.0) & (time < 0.1), -np.sin(np.pi * time / 0.1), 0.0)
+    names = [f"11HEAD0000H3AC{a}A" for a in "XYZ"] + [f"10VEHCCG0000AC{a}D" for a in "XYZ"]
+    held = [40.0 * pulse, 3.0 * pulse, 9.0 * pulse, 30.0 * pulse, 2.0 * pulse, 3.0 * pulse]
+    columns = [*held, 50.0 * pulse]
+    rows = [f"{t:.4f},{','.join(f'{c[k]:.5f}' for c in columns)}" for k, t in enumerate(time)]
+    units = ",".join(["s", *["g"] * 6, "deg/s"])
+    path = tmp_path / "test.csv"
+    path.write_text(
+        "\n".join([",".join(["Time", *names, "10VEHCCG0000AVZD"]), units, *rows]) + "\n"
+    )
+    done = run_cli("init", "crash", path, "--out", tmp_path / "case.toml")
+    assert done.code == 0, done.err
+    (unit,) = tomllib.loads((tmp_path / "case.toml").read_text(encoding="utf-8"))["units"]
+    (triad,) = unit["accelerometers"]
+    assert triad["channels"] == {a: f"10VEHCCG0000AC{a.upper()}D" for a in "xyz"}
+    assert unit["gyro"]["channels"] == {"z": "10VEHCCG0000AVZD"}

@@ -17,10 +17,10 @@ from tests.live.running import Run
 
 from strapdown.live.hub import Hub, StateWriter
 from strapdown.live.lines import BadLineError
+from strapdown.live.many import listening_socket
 from strapdown.live.phones import LineDevice, phyphox_buffers, phyphox_events
 from strapdown.live.replay import MachineClock
 from strapdown.live.session import SessionOptions
-from strapdown.live.web import listening_socket
 
 TIME = np.arange(0.0, 2.0, 0.01)
 

@@ -16,8 +16,8 @@ from tests.reference.test_allan_coverage import flicker
 
 import strapdown as sd
 from strapdown.navigation.truth_comparison import compare_with_truth
-from strapdown.sensors.allan import allan_model
 from strapdown.sensors.error_chain import apply
+from strapdown.sensors.noise_terms import allan_model
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import Origin, PathMotion, Track, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss

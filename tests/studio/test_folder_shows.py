@@ -17,7 +17,7 @@ from tests.map_files import mbtiles, pmtiles, png
 from strapdown.errors import ConfigError
 from strapdown.studio import app as studio_app
 from strapdown.studio import server
-from strapdown.studio.events import states_of
+from strapdown.studio.app import SAMPLES, states_of
 from strapdown.studio.folder import Folder
 from strapdown.studio.jobs import Jobs
 from strapdown.studio.live_jobs import (
@@ -27,7 +27,6 @@ from strapdown.studio.live_jobs import (
     live_info,
     shown_state,
 )
-from strapdown.studio.samples import SAMPLES
 
 
 @pytest.mark.parametrize("name", sorted(SAMPLES))

@@ -189,6 +189,16 @@ class GnssCourse(CoarseAlignment):
         """The least squares over a record; parameters and errors of `align`."""
         slowest, widest = self.least_speed, math.radians(self.largest_sd_deg)
         fixes = course_fixes(imu, gnss, slowest, widest, antenna)
+        assert gnss is not None  # refused otherwise
+        stamps = gnss.index.to_numpy(dtype=np.float64)
+        placed = usable(gnss, POSITION_SD)
+        placed &= (stamps >= imu.index[0]) & (stamps <= imu.index[-1])
+        if placed.any():
+            # Axes and rate of the Earth are those of the end: of a place 4 km before, the start
+            # would be 2 cm/s off in five minutes.
+            places = gnss[GEODETIC].to_numpy(dtype=np.float64)[placed]
+            lat_deg, lon_deg, alt = np.median(places[-NEWEST:], axis=0).tolist()
+            site = Site(lat_deg, lon_deg, alt, site.ellipsoid)
         rests = rest_rates(imu, fixes, sensors)
         yaw = math.radians(self.mounting_yaw_deg) + (math.pi if self.reverse else 0.0)
         slip = math.radians(self.sideslip_sd_deg)
@@ -216,12 +226,17 @@ SWEEPS = 3
 NEAR = 1.05
 # Share of the weight of fixes and rests in a state from which a filter meets them again.
 ONCE = 0.1
+# Number of newest positions, whose median is the place of the end.
+NEWEST = 5
 # Number of first positions, the first of which to agree with the others gives the position.
 ANCHORS = 9
 # A course error beyond this, rad, is that of a reversing vehicle.
 GROSS = 0.8
 # Courses closer than this, s, have the same sideslip.
 APART = 1.0
+# Ways are integrals of velocities at instants not farther apart than this, s: over an outage of the
+# fixes in which the vehicle drives off, those at its ends say nothing of the way.
+RESOLVED = 2.0
 # Variance of a random walk about its mean, of that at its end, 1/6, for stretches that are
 # independent, and of which a quarter of the whole has the same.
 WALK = 1.0 / 24.0
@@ -384,23 +399,22 @@ class CourseFit:
     def _observed(self, found: CourseEstimate, more: ArrayLike = ()) -> Observed:
         """Predict the fixes, the rests and `more` instants from the estimates, with residuals."""
         fixes, rests = self.fixes, self.rests
-        time = np.concatenate([fixes.time, [rest.time for rest in rests], np.asarray(more, float)])
+        parts = fixes.time, [rest.time for rest in rests], self._between(), np.asarray(more, float)
+        time = np.concatenate(parts)
         sums = drive_sums(self.imu, time, self.means, found.errors)
-        rate = _level_rate(found.velocity, self.site)
-        level = rotation.dcm_from_rotation_vector(rate * sums.until_end[:, None])
+        there, by, level = self._velocities(found, sums)
         C = level @ found.C @ sums.turned
         turns = np.zeros((len(time), 3, self.unknowns))
         turns[:, :, TURN] = np.eye(3)
         turns[:, :, OF_GYROS] = found.C @ sums.by_gyro
-        there, by = self._velocities(found, sums, rate)
         k = len(fixes.time)
         if self.by_places:
             assert fixes.place is not None and fixes.place_sd is not None
-            way, by_way = self._displacements(found, sums, there, by, slice(k))
+            way, by_way = self._displacements(found, sums, there, by)
             arm, by_arm = self._arms(found, sums, turns, slice(k))
-            rows = by_way + by_arm
+            rows = by_way[:k] + by_arm
             rows[:, :, OFFSET] = there[:k]
-            gap, fix_sd = fixes.place - (found.place + (way + arm)), fixes.place_sd
+            gap, fix_sd = fixes.place - (found.place + (way[:k] + arm)), fixes.place_sd
             within = self._walk(sums)
         else:
             arm = np.cross(sums.rate[:k], self.model.antenna.lever_arm)
@@ -456,7 +470,7 @@ class CourseFit:
         _, inverse, _ = _solve(parts, seen.prior, found.errors)
         here = len(seen.level) - 1
         there = seen.velocity, seen.by_velocity
-        way, by_way = self._displacements(found, seen.sums, *there, slice(None))
+        way, by_way = self._displacements(found, seen.sums, *there)
         if self.by_places:
             at, by_at, own = found.place + way[here], by_way[here], np.zeros(3)
         else:
@@ -551,35 +565,51 @@ class CourseFit:
         sd[OFFSET], sd[ARM] = model.antenna.time_offset_sd, model.antenna.lever_arm_sd
         return sd
 
-    def _velocities(
-        self, found: CourseEstimate, sums: DriveSums, rate: Array
-    ) -> tuple[Array, Array]:
-        """Velocities at the fixes, in the level axes of the end, and their derivatives.
+    def _velocities(self, found: CourseEstimate, sums: DriveSums) -> tuple[Array, Array, Array]:
+        """Velocities at instants, in the level axes of the end, derivatives, and axes from there.
 
-        The level rotates with w: ``v = v_e - C int f - g T + w x g T²/2 + w_ie x int v``.
+        The Earth turns, and gravity points down where the vehicle is, W the transport rate of a
+        velocity and s the way to the end:
+        ``v = v_e - C int f - int g + w_ie x s + int (W s) x g``.
         """
-        T, g = sums.until_end[:, None], self.site.gravity
         gained = sums.gained @ found.C.T
-        v = found.velocity - gained - g * T + np.cross(rate, g) * 0.5 * T * T
-        from_end = np.argsort(-sums.until_end, kind="stable")[::-1]
-        way = np.empty_like(v)
-        way[from_end] = running_integral(
-            np.append(0.0, sums.until_end[from_end]), np.vstack([found.velocity, v[from_end]])
-        )[1:]
-        v = v + np.cross(self.site.earth_rate, way)
+        v = found.velocity - gained - self._fallen(sums.until_end)[0]
         by = np.zeros((len(v), 3, self.unknowns))
-        by[:, :, END_VELOCITY] = np.eye(3) + 0.5 * T[:, :, None] ** 2 * self._bent
+        by[:, :, END_VELOCITY] = np.eye(3)
         by[:, :, TURN] = rotation.cross_matrix(gained)
         by[:, :, OF_GYROS] = found.C @ sums.by_turn
         by[:, :, OF_ACCELS] = found.C @ sums.by_accel
+        from_end = np.argsort(-sums.until_end, kind="stable")[::-1]
+        past = np.append(0.0, sums.until_end[from_end])
+        spun, bent, of_way, fallen = self._spun, self._bent, self._of_way, v[from_end]
+        for _ in range(2):  # the way by what is left out is its second order
+            ways = running_integral(past, np.vstack([found.velocity, v[from_end]]))
+            v[from_end] = fallen + (ways @ spun.T + running_integral(past, ways @ bent.T))[1:]
         # A tilt and a bias that cancel each other do so to the last digit that the fixes resolve:
         # without these terms, 0.4 % over a minute, fixes of a centimetre seem to separate the two.
-        past = np.append(0.0, sums.until_end[from_end])
-        along = np.concatenate([np.eye(self.unknowns)[None, END_VELOCITY], by[from_end]])
-        by[from_end] += self._spun @ running_integral(past, along)[1:]
-        time = -sums.until_end[: len(self.fixes.time)]
-        by[: len(time), :, OFFSET] = np.gradient(v[: len(time)], time, axis=0)
-        return v, by
+        end = np.eye(self.unknowns)[None, END_VELOCITY]
+        along = running_integral(past, np.concatenate([end, by[from_end]]))
+        by[from_end] += (spun @ along + running_integral(past, bent @ along))[1:]
+        k = len(self.fixes.time)
+        by[:k, :, OFFSET] = np.gradient(v[:k], -sums.until_end[:k], axis=0)
+        turn = self.site.earth_rate * sums.until_end[:, None]
+        turn[from_end] += ways[1:] @ of_way.T
+        return v, by, rotation.dcm_from_rotation_vector(turn)
+
+    def _fallen(self, until_end: Array) -> tuple[Array, Array]:
+        """Integral of gravity, as the Earth turns it, over times to the end, and that once more.
+
+        A series in the turn of the Earth: of 300 s, 0.02 rad, the first order leaves 0.1 m/s.
+        """
+        T = until_end[:, None]
+        term, power = self.site.gravity, T
+        once, twice = np.zeros((len(T), 3)), np.zeros((len(T), 3))
+        for order in range(2, 7):
+            once += power * term
+            power = power * T / order
+            twice += power * term
+            term = -np.cross(self.site.earth_rate, term)
+        return once, twice
 
     @property
     def _spun(self) -> Array:
@@ -589,22 +619,35 @@ class CourseFit:
     @property
     def _bent(self) -> Array:
         """Change of gravity's direction by a way, (3, 3): ``(W s) x g`` of the transport rate."""
+        return np.asarray(-rotation.cross_matrix(self.site.gravity[None])[0] @ self._of_way)
+
+    @property
+    def _of_way(self) -> Array:
+        """Turn of the level axes by a way, (3, 3), rad/m: W of the transport rate."""
         site = self.site
         rates = transport_rate(site.lat_deg, site.alt, np.eye(3), ellipsoid=site.ellipsoid)
-        return np.asarray(-rotation.cross_matrix(site.gravity[None])[0] @ rates.T)
+        return np.asarray(rates.T, dtype=np.float64)
+
+    def _between(self) -> Array:
+        """Instants between fixes that are farther apart than `RESOLVED`, s."""
+        begin, end = float(self.imu.index[0]), float(self.imu.index[-1])
+        nodes = np.concatenate([[begin], self.fixes.time, [end]])
+        count = np.ceil(np.diff(nodes) / RESOLVED).clip(1).astype(np.intp)
+        part = np.concatenate([np.arange(1.0, n) / n for n in count])
+        begun, length = (np.repeat(of, count - 1) for of in (nodes[:-1], np.diff(nodes)))
+        return np.asarray(begun + part * length)
 
     def _displacements(
-        self, found: CourseEstimate, sums: DriveSums, there: Array, by: Array, rows: slice
+        self, found: CourseEstimate, sums: DriveSums, there: Array, by: Array
     ) -> tuple[Array, Array]:
         """Positions at instants less that at the end, and their derivatives.
 
         In Earth-fixed axes, level at the end, ``s = s_e - int (1 + [w_ie x] T) v``: the axes have
         turned by ``w_ie T`` since. `there`, `by`: velocities, and their derivatives.
         """
-        earth, until = self.site.earth_rate, sums.until_end[rows]
-        T, g = until[:, None], self.site.gravity
-        moved = sums.moved[rows] @ found.C.T
-        way = found.velocity * T - moved - 0.5 * g * T**2 + np.cross(earth, g) * T**3 / 6.0
+        until, T = sums.until_end, sums.until_end[:, None]
+        moved = sums.moved @ found.C.T
+        way = found.velocity * T - moved - self._fallen(until)[1]
         # By integrals from fix to fix: the Earth turns the way and the velocity, and gravity points
         # down where the vehicle is, not where it ends.
         from_end = np.argsort(-until, kind="stable")[::-1]
@@ -619,16 +662,16 @@ class CourseFit:
                 past, spun @ (ways + spread) + running_integral(past, bent @ ways)
             )
 
-        along = np.vstack([found.velocity, there[rows][from_end]])
+        along = np.vstack([found.velocity, there[from_end]])
         way[from_end] += turned(along[:, :, None])[1:, :, 0]
         out = np.zeros((len(until), 3, self.unknowns))
         out[:, :, COUNT:] = np.eye(3)[:, : self.unknowns - COUNT]
         out[:, :, END_VELOCITY] = -T[:, :, None] * np.eye(3)
         out[:, :, TURN] = -rotation.cross_matrix(moved)
-        out[:, :, OF_GYROS] = -found.C @ sums.moved_by_turn[rows]
-        out[:, :, OF_ACCELS] = -found.C @ sums.moved_by_accel[rows]
+        out[:, :, OF_GYROS] = -found.C @ sums.moved_by_turn
+        out[:, :, OF_ACCELS] = -found.C @ sums.moved_by_accel
         end = np.eye(self.unknowns)[None, END_VELOCITY]
-        out[from_end] -= turned(np.concatenate([end, by[rows][from_end]]))[1:]
+        out[from_end] -= turned(np.concatenate([end, by[from_end]]))[1:]
         return -way, out
 
     def _arms(
@@ -890,12 +933,6 @@ def _excess(residuals: Array) -> float:
         return 1.0
     r = min(max(float(residuals[1:] @ residuals[:-1]) / power, 0.0), 1.0 - 2.0 / n)
     return max(1.0, power / n * (1.0 + r) / (1.0 - r))
-
-
-def _level_rate(velocity: Array, site: Site) -> Array:
-    """Rate of the local level against inertial space, rad/s."""
-    moving = transport_rate(site.lat_deg, site.alt, velocity, ellipsoid=site.ellipsoid)
-    return np.asarray(site.earth_rate + moving)
 
 
 # Initial attitude of a drive: over a short end of the record first, then over more.

@@ -12,9 +12,8 @@ import pandas as pd
 from strapdown.api.navigation import specify_navigation
 from strapdown.api.reading import ImuFile, imu_input, imu_of, keys_in, log_table, table_input
 from strapdown.api.stamps import by_time
-from strapdown.config.extrinsics import ExtrinsicsSpec
 from strapdown.config.logs import LogTable
-from strapdown.config.navigation import NavigationSpec
+from strapdown.config.navigation import ExtrinsicsSpec, NavigationSpec
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, StrapdownError
 from strapdown.formats.gnss_files import read_gnss

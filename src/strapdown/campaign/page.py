@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from strapdown.campaign.results import (
+from strapdown.campaign.summary import (
     Cell,
     Results,
     between,

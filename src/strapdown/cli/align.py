@@ -174,18 +174,16 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
             called=lambda argument: f"--{argument}",
         )
     except ConfigError as error:
-        raise as_flag(error, _flag) from None
+        raise as_flag(error, FLAGS, _flag) from None
 
 
 def _flag(place: str) -> str:
-    if flag := FLAGS.get(place) or FLAGS.get(f"log, {place}"):
-        return flag
     # A path that names a flag already is kept.
     said = [part for part in place.split(", ") if part.startswith("--")]
     if said:
         return said[-1]
     stage, _, rest = place.partition(", ")
-    flag = FLAGS.get(f"{stage}, kind")
+    flag = FLAGS.get(f"{stage}, kind") or FLAGS.get(f"log, {place}")
     return place if flag is None else f"{flag}, {rest}" if rest else flag
 
 

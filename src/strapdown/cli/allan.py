@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from strapdown.cli.shared_options import (
-    LOG_FLAGS,
     LogFlags,
     ReportFlags,
     as_flag,
@@ -92,7 +91,7 @@ def allan(
             keys.update(axes=flags.axes, at_rest=at_rest, target=program)
             return analyse(*map(str, logs), progress=report, **keys)
         except ConfigError as error:
-            raise as_flag(error, _flag) from None
+            raise as_flag(error, {"target": "--for"}) from None
 
     def show(result: AllanRun) -> None:
         print_noise(result, sensor_file)
@@ -100,14 +99,6 @@ def allan(
 
     folder = folder_to_write(out, logs[0], "allan", write.force)
     run_and_save(compute, folder, write, "allan.json", show, beside)
-
-
-def _flag(place: str) -> str:
-    return (
-        "--for"
-        if place == "target"
-        else LOG_FLAGS.get(place, LOG_FLAGS.get(f"log, {place}", place))
-    )
 
 
 def print_noise(result: AllanRun, sensor_file: Path | None) -> None:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from strapdown.cli.shared_options import (
-    LOG_FLAGS,
     Height,
     LogFlags,
     ReportFlags,
     Sensor,
     as_flag,
+    flags_by_key,
     folder_to_make,
     log_keys,
     running,
@@ -34,13 +34,6 @@ EPILOG = (
     "Example: strapdown attitude log.csv --calibration calibration.toml"
 )
 MOST = 4  # findings on the terminal
-FLAGS = {
-    "gravity_m_per_s2": "--gravity",
-    "lat_deg": "--lat",
-    "alt_m": "--alt",
-    "pose_sd_deg": "--pose-sd",
-    "turn_sd_deg": "--turn-sd",
-}
 #: Options, by the keys that other programs and the configuration have for them.
 KEYS = {
     **dict.fromkeys(("gravity", "g", "gravity_m_per_s2"), "--gravity"),
@@ -70,23 +63,27 @@ class ProcedureFlags:
             "order; or a table: axis, angle_deg or rate_deg_per_s, sd_deg, log, from_s, to_s.",
         ),
     ] = None
-    turn_sd: Annotated[
-        float | None,
-        running("DEG", "Standard deviation of the known angles (3).", show_default=False),
+    turn_sd_deg: Annotated[
+        float | None, running("DEG", "Standard deviation of the known angles (3).", "--turn-sd")
     ] = None
-    pose_sd: Annotated[
+    pose_sd_deg: Annotated[
         float | None,
-        running("DEG", "Standard deviation of the faces in six positions (2).", show_default=False),
+        running("DEG", "Standard deviation of the faces in six positions (2).", "--pose-sd"),
     ] = None
-    gravity: Annotated[
+    gravity_m_per_s2: Annotated[
         float | None,
         with_what(
-            "M/S2", "Local gravity, 9.8123; by --lat and --alt, or the Earth's mean, if not given."
+            "M/S2",
+            "Local gravity, 9.8123; by --lat and --alt, or the Earth's mean, if not given.",
+            "--gravity",
         ),
     ] = None
     lat: Annotated[float | None, with_what("DEG", "Latitude, north positive.")] = None
     alt: Height = None
     sensor: Sensor = None
+
+
+FLAGS = flags_by_key(ProcedureFlags) | {"lat_deg": "--lat", "alt_m": "--alt"}
 
 
 @spread
@@ -130,24 +127,13 @@ def calibrate(
         calibration_file, "--calibration-file", write.force, lambda run: str(run.calibration_text())
     )
     keys = {key: value for key, value in log_keys(flags.given()).items() if value}
+    keys |= {key: value for key, value in asdict(asked).items() if value is not None}
 
     def compute(report: Progress) -> CalibrateRun:
         try:
-            return find(
-                [str(log) for log in logs],
-                procedure=asked.procedure,
-                turns=asked.turns,
-                gravity_m_per_s2=asked.gravity,
-                lat=asked.lat,
-                alt=asked.alt or 0.0,
-                sensor=asked.sensor,
-                progress=report,
-                pose_sd_deg=asked.pose_sd,
-                turn_sd_deg=asked.turn_sd,
-                **keys,
-            )
+            return find([str(log) for log in logs], progress=report, **keys)
         except ConfigError as error:
-            raise as_flag(error, _flag) from None
+            raise as_flag(error, FLAGS) from None
 
     def show(result: CalibrateRun) -> None:
         print_calibration(result)
@@ -155,11 +141,6 @@ def calibrate(
 
     folder = folder_to_write(out, logs[0], "calibrate", write.force)
     run_and_save(compute, folder, write, "calibrate.json", show, beside)
-
-
-def _flag(place: str) -> str:
-    own = FLAGS.get(place)
-    return own or LOG_FLAGS.get(place, LOG_FLAGS.get(f"log, {place}", f"--{place}"))
 
 
 def print_calibration(result: CalibrateRun) -> None:

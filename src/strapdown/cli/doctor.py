@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from strapdown.cli.shared_options import (
-    LOG_FLAGS,
     FixFlags,
     LogFlags,
     ReportFlags,
@@ -76,12 +75,12 @@ def doctor(
             gnss = fix_keys(fixes.given(), None)
             return examine(paths, axes=flags.axes, gnss=gnss, progress=report, **keys)
         except ConfigError as error:
-            raise as_flag(error, lambda key: LOG_FLAGS.get(f"log, {key}", key)) from None
+            raise as_flag(error, {}) from None
 
     def show(result: Diagnosis) -> None:
-        paths = {one.name: log.path for log, one in zip(result.spec.logs, result.logs, strict=True)}
+        paths = {one.name: one.log.path for one in result.logs}
         for one in result.logs:
-            print_log(one, paths, [x.log.path for x in result.logs], tables=write.verbose)
+            print_log(one, paths, [x.path for x in result.spec.logs], tables=write.verbose)
         print_findings(result.between)
 
     folder = folder_to_write(out, logs[0], "doctor", write.force)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from strapdown.cli.shared_options import (
-    LOG_FLAGS,
     FixFlags,
     LogFlags,
     ReportFlags,
@@ -16,6 +16,7 @@ from strapdown.cli.shared_options import (
     as_flag,
     fix_flags,
     fix_keys,
+    flags_by_key,
     folder_to_make,
     log_keys,
     running,
@@ -35,6 +36,38 @@ EPILOG = (
 MOST = 6  # findings on the terminal
 
 
+@dataclass(frozen=True)
+class PairFlags:
+    """The other sensor, and what is known of both, by argument of `find`."""
+
+    kind: Annotated[
+        str | None,
+        running("imu|magnetometer|gnss", "What OTHER is, if it is not found.", "--kind"),
+    ] = None
+    offset: Annotated[
+        float | None,
+        running("S", "Clock of OTHER less that of LOG, to 0.3 s; searched, if not given."),
+    ] = None
+    not_on_wheels: Annotated[
+        bool,
+        running(
+            None, "With fixes: the vehicle does not roll; no mounting angles.", "--not-on-wheels"
+        ),
+    ] = False
+    sensor: Sensor = None
+    other_axes: Annotated[
+        str | None, running("X,Y,Z", "Axes of OTHER, as --axes of LOG.", "--other-axes")
+    ] = None
+    other_calibration: Annotated[
+        Path | None,
+        running("FILE.toml", "Of OTHER, as --calibration of LOG.", "--other-calibration"),
+    ] = None
+    heading_deg: Annotated[
+        float | None,
+        with_what("DEG", "Initial heading, if neither gyros nor course determine it.", "--heading"),
+    ] = None
+
+
 @spread
 def extrinsics(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="Log of gyros and accelerometers, a.")],
@@ -46,33 +79,8 @@ def extrinsics(
             "it, the magnetometer in LOG.",
         ),
     ] = None,
-    kind: Annotated[
-        str | None,
-        running("imu|magnetometer|gnss", "What OTHER is, if it is not found.", "--kind"),
-    ] = None,
-    offset: Annotated[
-        float | None,
-        running("S", "Clock of OTHER less that of LOG, to 0.3 s; searched, if not given."),
-    ] = None,
-    not_on_wheels: Annotated[
-        bool,
-        running(
-            None, "With fixes: the vehicle does not roll; no mounting angles.", "--not-on-wheels"
-        ),
-    ] = False,
-    sensor: Sensor = None,
-    other_axes: Annotated[
-        str | None, running("X,Y,Z", "Axes of OTHER, as --axes of LOG.", "--other-axes")
-    ] = None,
-    other_calibration: Annotated[
-        Path | None,
-        running("FILE.toml", "Of OTHER, as --calibration of LOG.", "--other-calibration"),
-    ] = None,
-    heading: Annotated[
-        float | None,
-        with_what("DEG", "Initial heading, if neither gyros nor course determine it."),
-    ] = None,
     *,
+    asked: PairFlags,
     flags: LogFlags,
     fixes: FixFlags,
     out: Annotated[Path | None, folder_to_make("LOG-extrinsics")] = None,
@@ -89,7 +97,10 @@ def extrinsics(
 
     refuse_result(log, "log")
     keys: dict[str, Any] = {k: v for k, v in log_keys(flags.given()).items() if v}
-    keys |= {"other_calibration": None if other_calibration is None else str(other_calibration)}
+    keys |= {**asdict(asked), "axes": flags.axes}
+    keys["wheels"] = not keys.pop("not_on_wheels")
+    if asked.other_calibration is not None:
+        keys["other_calibration"] = str(asked.other_calibration)
     of_fixes = fix_keys(fixes.given(), None)
 
     def compute(report: Progress) -> ExtrinsicsRun:
@@ -98,18 +109,11 @@ def extrinsics(
             return find(
                 str(log),
                 read_gnss(second, **of_fixes) if second and of_fixes else second,
-                kind=kind,
-                offset=offset,
-                sensor=sensor,
-                wheels=not not_on_wheels,
-                axes=flags.axes,
-                other_axes=other_axes,
-                heading_deg=heading,
                 progress=report,
                 **keys,
             )
         except ConfigError as error:
-            raise as_flag(error, _flag) from None
+            raise as_flag(error, FLAGS) from None
 
     folder = folder_to_write(out, log, "extrinsics", write.force)
     run_and_save(
@@ -119,21 +123,13 @@ def extrinsics(
 
 #: Options by key path of the specification; those of reading LOG also under ``log``.
 FLAGS = {
-    "kind": "--kind",
     "other": "OTHER",
     "gnss": "OTHER",
-    "sensor": "--sensor",
     "offset_s": "--offset",
     "heading": "--heading",
-    "heading_deg": "--heading",
-    "other_axes": "--other-axes",
-    "other_calibration": "--other-calibration",
+    **flags_by_key(PairFlags),
     **fix_flags("navigation, aiding, gnss"),
 }
-
-
-def _flag(place: str) -> str:
-    return FLAGS.get(place, LOG_FLAGS.get(place, LOG_FLAGS.get(f"log, {place}", place)))
 
 
 def print_extrinsics(result: ExtrinsicsRun) -> None:

@@ -304,11 +304,7 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
             called=lambda argument: f"--{argument}",
         )
     except ConfigError as error:
-        raise as_flag(error, _flag) from None
-
-
-def _flag(place: str) -> str:
-    return FLAGS.get(place) or FLAGS.get(f"log, {place}", place)
+        raise as_flag(error, FLAGS) from None
 
 
 def _arm(text: str) -> tuple[float, float, float]:

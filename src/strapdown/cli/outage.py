@@ -228,11 +228,11 @@ def outage_of_flags(
     try:
         return specify(OutageSpec, **table)
     except ConfigError as error:
-        raise as_flag(error, _flag) from None
+        raise as_flag(error, FLAGS, _with) from None
 
 
-def _flag(place: str) -> str:
-    return FLAGS.get(place, "--with" if place.startswith("aiding") else place)
+def _with(place: str) -> str:
+    return "--with" if place.startswith("aiding") else place
 
 
 def print_outage(result: OutageRun) -> None:

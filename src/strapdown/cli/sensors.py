@@ -78,7 +78,7 @@ def sensors(
         try:
             return report.compare(specify(SensorsSpec, sensor=tuple(given), **keys), progress)
         except ConfigError as error:
-            raise as_flag(error, lambda place: FLAGS.get(place, place)) from None
+            raise as_flag(error, FLAGS) from None
 
     def show(run: SensorsRun) -> None:
         _print(report.list_block(report.catalogue_table(run.sensors)))

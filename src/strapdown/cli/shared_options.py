@@ -413,11 +413,21 @@ def refuse_without_live(given: Mapping[str, Any]) -> None:
             raise ConfigError("live.only-with", option=flag, beside="--live")
 
 
-def as_flag(error: ConfigError, flag: Callable[[str], str]) -> ConfigError:
+def as_flag(
+    error: ConfigError,
+    flags: Mapping[str, str],
+    otherwise: Callable[[str], str] = lambda place: LOG_FLAGS.get(f"log, {place}", place),
+) -> ConfigError:
     """Return the error, or each of several, with the option instead of the key path.
 
-    `flag`: flag of a key path of a specification.
+    `flags`: flags by key path of a specification, beside those of a log; `otherwise`: flag of
+    another path.
     """
+    known = {**LOG_FLAGS, **flags}
+
+    def flag(place: str) -> str:
+        return known.get(place) or otherwise(place)
+
     if error.finding.code == "config.several":
         faults = [
             f.replace(quantity=flag(f.quantity)) if f.quantity else f

@@ -595,3 +595,23 @@ def make_filter(spec: NavigationSpec, sensors: ImuUncertainty) -> ErrorFilter:
 def make_aids(spec: NavigationSpec) -> tuple[Measurement, ...]:
     """Create the measurements of a specification, in its order."""
     return tuple(aid.make(ellipsoid=spec.ellipsoid, name=name) for name, aid in spec.aiding.items())
+
+
+class ExtrinsicsSpec(FileSpec):
+    """Logs of two sensors on one rigid body."""
+
+    called = "extrinsics"
+
+    kind: Literal["imu", "magnetometer", "gnss"]
+    log: LogTable
+    #: Log of the other sensor; the same log, if not given.
+    other: LogTable | None = None
+    #: Orientation of the axes, as `AxesTable.axes`.
+    axes: Word | None = None
+    other_axes: Word | None = None
+    #: Clock of the other less that of the log, roughly; searched, if not given.
+    offset_s: Number | None = None
+    #: Whether both have the same clock.
+    one_clock: StrictBool = False
+    #: Of fixes: the smoothed run whose states are the extrinsics.
+    navigation: NavigationSpec | None = None

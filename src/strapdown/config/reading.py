@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import ValidationError
 
+from strapdown.bundle import names_file
 from strapdown.config.spec import Fault, Spec, faults_of, fields_at, located, refusal, written_path
 from strapdown.config.toml_file import KeyPath, TomlFile, place_of, read_toml, shown, shown_key
 from strapdown.errors import ConfigError, Finding
@@ -182,8 +183,7 @@ def _with_absolute_paths(file: TomlFile) -> tuple[dict[str, Any], list[Fault]]:
         if any(word in node for word in OF_LOG):
             return node
         key = next((k for k in reversed(path) if isinstance(k, str)), "")
-        own = key in ("sensor", "severity", "calibration") and node.lower().endswith(".toml")
-        if key != "path" and not own:
+        if not names_file(key, node):
             return node
         found = _find(file.path, path, node)
         if isinstance(found, str):

@@ -146,15 +146,8 @@ def run_cases(
 ) -> tuple[CaseResult, ...]:
     """Reconstruct every vehicle of a crash by its own case, and close two vehicles.
 
-    Parameters
-    ----------
-    cases : sequence of (CaseSpec, Path or None)
-        Of each vehicle, as `run_case`.
-
-    Returns
-    -------
-    tuple of CaseResult
-        Each with the inputs of all, since its closure depends on them.
+    `cases`: of each vehicle, as `run_case`. Each with the inputs of all, since its closure depends
+    on them.
     """
     if len(cases) > 1:
         _refuse_one_vehicle(cases)
@@ -312,18 +305,8 @@ def reconstruct_recorder(
 ) -> UnitReconstruction:
     """Reconstruct a crash by one of its recorders alone, with linear bounds: a part of `run_case`.
 
-    Parameters
-    ----------
-    spec : CaseSpec
-    records : mapping of str to CrashRecord
-        Both as of `whole_records`.
-    number : int
-        Of the recorder, from 0.
-
-    Raises
-    ------
-    ConfigError, DataError, DivergenceError
-        As `run_case`.
+    `records`: both as of `whole_records`. `number`: of the recorder, from 0. `ConfigError,
+    DataError, DivergenceError`: as `run_case`.
     """
     unit = case_unit(spec.units[number], records)
     options = _options(spec)

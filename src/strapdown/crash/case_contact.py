@@ -42,14 +42,9 @@ def main_event(unit: UnitReconstruction) -> int | None:
 class Deformation:
     """Crush and energy of a vehicle, as far as its case has what they need.
 
-    Attributes
-    ----------
-    crush : tuple of Crush
-        Against a barrier: by the main answer, then by every recorder.
-    impulses : tuple of (str, Figure), N s
-        Of the measured forces on it, with the names of their references.
-    energy : Figure, J, optional
-        From the residual crush and the stiffness; with the mass its `equivalent_speed`, m/s.
+    `crush`: against a barrier: by the main answer, then by every recorder. `impulses`, N s: of the
+    measured forces on it, with the names of their references. `energy`, J: from the residual crush
+    and the stiffness; with the mass its `equivalent_speed`, m/s.
     """
 
     crush: tuple[Crush, ...] = ()

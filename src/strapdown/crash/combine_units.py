@@ -18,10 +18,8 @@ from strapdown.sensors.rest import LEAST_SAMPLES, RestStretch, rest_between
 from strapdown.tables import imu_table
 from strapdown.tables.checks import Array
 
-COMBINATIONS = ("weighted", "median")
 
-
-def combine_units(units: Sequence[PointKinematics], method: str = "weighted") -> PointKinematics:
+def combine_units(units: Sequence[PointKinematics]) -> PointKinematics:
     """Combine units that were moved to one point.
 
     Parameters
@@ -29,27 +27,24 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
     units : sequence of PointKinematics
         Of one vehicle, at one point; the stamps of the first are kept, where all have samples,
         and the others are interpolated linearly.
-    method : {'weighted', 'median'}
-        One weight per unit and axis for the whole record, from the stated uncertainty of its
-        change of velocity over the crash (`force_weights`): the mean's change of velocity then
-        lies between those of the units. Or, for three units or more, the median of each axis and
-        sample, which a single outlying unit hardly moves.
 
     Returns
     -------
     PointKinematics
-        With the unknowns of all units, each scaled by the weight of its unit; an unknown that two
-        units share, such as the bias of a borrowed gyro, is one. Rates are weighted by the
-        uncertainty of the rotation from 0.1 s before to 0.75 s after the trigger. The combination
-        is leveled from its mean specific force over the common stationary interval; without one,
-        or where an attitude was stated, its level is the mean of theirs.
+        One weight per unit and axis for the whole record, from the stated uncertainty of its change
+        of velocity over the crash (`force_weights`): the mean's change of velocity then lies
+        between those of the units. With the unknowns of all units, each scaled by the weight of its
+        unit; an unknown that two units share, such as the bias of a borrowed gyro, is one. Rates
+        are weighted by the uncertainty of the rotation from 0.1 s before to 0.75 s after the
+        trigger. The combination is leveled from its mean specific force over the common stationary
+        interval; without one, or where an attitude was stated, its level is the mean of theirs.
 
     Raises
     ------
     DataError
         There are fewer than two common samples.
     ConfigError
-        There are too few units, the method is unknown, or a median has units with assumed axes.
+        There are too few units.
 
     Notes
     -----
@@ -57,23 +52,8 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
     Samples of a combination are treated as independent, although gyro noise through a lever arm
     is not: this is conservative.
     """
-    if method not in COMBINATIONS:
-        raise ConfigError(
-            "crash.no-way-combine-units",
-            quantity="method",
-            method=method,
-            combinations=COMBINATIONS,
-        )
-    if len(units) < 2 or (method == "median" and len(units) < 3):
-        raise ConfigError(
-            "crash.units-cannot-combined", quantity="units", count=len(units), method=method
-        )
-    if method == "median" and any(u.unmeasured.any() for u in units):
-        raise ConfigError(
-            "crash.median-takes-every-unit-value",
-            file=next(u.name for u in units if u.unmeasured.any()),
-            quantity="units",
-        )
+    if len(units) < 2:
+        raise ConfigError("crash.units-cannot-combined", quantity="units", count=len(units))
     first, last = max(float(u.time[0]) for u in units), min(float(u.time[-1]) for u in units)
     time = units[0].time
     time = time[(time >= first) & (time <= last)]
@@ -81,16 +61,12 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
         raise DataError("crash.units-share-samples", quantity="units", size=time.size)
     at = [_at(u, time) for u in units]
     force = np.array([u.force for u in at])
-    if method == "weighted":
-        weights = np.repeat(force_weights(at)[:, None], time.size, axis=1)
-    else:
-        weights = _median_weights(force)
+    weights = np.repeat(force_weights(at)[:, None], time.size, axis=1)
     # Rotation is that of the units that measure it about the most axes; assumed axes do not count.
     assumed = np.round([np.trace(u.unmeasured_turns) for u in at])
     counted = np.asarray(assumed == assumed.min())
     turning = _rate_weights(at, counted)
-    kind = "weighted mean" if method == "weighted" else method
-    name = f"{kind} of {', '.join(u.name for u in units)}"
+    name = f"weighted mean of {', '.join(u.name for u in units)}"
     imu = imu_table(
         time,
         np.tensordot(turning, np.array([u.rate for u in at]), axes=1),
@@ -192,18 +168,6 @@ def _without_own_tilt(unit: PointKinematics) -> SampleEffects:
     C_nb = rotation.dcm_from_euler([own.roll_deg, own.pitch_deg, 0.0])
     tilt = level_turned_by(effects.rest_force, C_nb)
     return replace(effects, tilt=effects.tilt - tilt)
-
-
-def _median_weights(force: Array) -> Array:
-    """One for the middle unit, a half for each of two middle units; per sample and axis."""
-    count = len(force)
-    order = np.argsort(force, axis=0, kind="stable")
-    weights = np.zeros((*force.shape, 3))
-    middle = {(count - 1) // 2, count // 2}
-    n, axes = np.indices(force.shape[1:])
-    for place in middle:
-        weights[order[place], n, axes, axes] = 1.0 / len(middle)
-    return weights
 
 
 def _rate_weights(units: Sequence[PointKinematics], counted: NDArray[np.bool_]) -> Array:

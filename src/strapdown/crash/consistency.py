@@ -31,7 +31,8 @@ from strapdown.crash.structure import (
 )
 from strapdown.dsp.chi_square import chi_square_above
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
-from strapdown.sensors.unmeasured import NO_GYRO
+from strapdown.formats.inference.rotation_rate import signed_permutations
+from strapdown.sensors.crash_unit import NO_GYRO
 from strapdown.tables.checks import Array
 
 # Relative to the largest variance: smaller covariances are rounding.
@@ -166,10 +167,12 @@ def floored(covariance: Array) -> Array:
     return np.asarray(covariance + max(FLOOR * largest, TINY) * np.eye(covariance.shape[-1]))
 
 
-def common_edges(
-    units: Sequence[PointKinematics], window: tuple[float, float] | None, pieces: int
-) -> Array:
-    """Edges of equal intervals over a window that all units cover.
+#: Intervals of a comparison, at most, and the probability below which it is a disagreement.
+PIECES, LEVEL = 20, 1e-3
+
+
+def common_edges(units: Sequence[PointKinematics]) -> Array:
+    """Edges of equal intervals over the crash, as far as all units cover it.
 
     `DataError`: the units do not cover it. `ConfigError`: an interval is shorter than two samples.
     """
@@ -179,19 +182,18 @@ def common_edges(
     last = min(float(u.time[-1]) for u in units)
     # A unit without a gyro does not know the turning after the time of its assumption.
     known = [u.assumed_until for u in units]
-    start, end = (max(first, -0.1), min(last, 0.75, *known)) if window is None else window
+    start, end = max(first, -0.1), min(last, 0.75, *known)
     if not first <= start < end <= last:
         begins = next(u.name for u in units if u.time[0] == first)
         ends = next(u.name for u in units if u.time[-1] == last)
-        wanted = (-0.1, 0.75) if window is None else window
         raise DataError(
             "crash.share-does-not-cover-begins",
             quantity="window",
             units=[u.name for u in units],
             first=first,
             last=last,
-            wanted=wanted[0],
-            wanted_2=wanted[1],
+            wanted=-0.1,
+            wanted_2=0.75,
             begins=begins,
             ends=ends,
         )
@@ -204,7 +206,7 @@ def common_edges(
             end=end - start,
             coarsest=coarsest,
         )
-    return np.linspace(start, end, min(pieces, most) + 1)
+    return np.linspace(start, end, min(PIECES, most) + 1)
 
 
 def velocity_increments(unit: PointKinematics, edges: Array) -> VelocityIncrements:
@@ -616,17 +618,6 @@ class AxisMatch:
         return "gyro" if gyro else "agree"
 
 
-def signed_permutations() -> Array:
-    """All 48 matrices with one ±1 in each row and column; 24 are rotations."""
-    found = []
-    for order in itertools.permutations(range(3)):
-        for signs in itertools.product((1.0, -1.0), repeat=3):
-            matrix = np.zeros((3, 3))
-            matrix[range(3), order] = signs
-            found.append(matrix)
-    return np.array(found)
-
-
 def match_axes(
     first: VelocityIncrements, second: VelocityIncrements, turned: Array | None = None
 ) -> AxisMatch:
@@ -643,7 +634,7 @@ def match_axes(
     is taken, and the identity where it fits with a probability of 1e-3 or more. Accelerometers and
     gyros are judged separately, since either may be wired wrong; a shared gyro is not judged.
     """
-    candidates = signed_permutations()
+    candidates = signed_permutations()[1]
     if turned is not None and (np.diag(turned) > math.cos(math.pi / 4.0)).all():
         candidates = np.concatenate([candidates, turned[None]])
     accel, lead, other = _best(first, second, "force", candidates)
@@ -687,17 +678,11 @@ def axis_findings(match: AxisMatch, first: str, second: str) -> list[Finding]:
     kind = match.kind
     if kind == "agree":
         return []
-    parts = {
-        "unit": [("unit", match.accelerometers, match.accelerometers_lead)],
-        "accelerometers": [("accelerometers", match.accelerometers, match.accelerometers_lead)],
-        "gyro": [("gyro", match.gyro, match.gyro_lead)],
-        "both": [
-            ("accelerometers", match.accelerometers, match.accelerometers_lead),
-            ("gyro", match.gyro, match.gyro_lead),
-        ],
-    }[kind]
     found: list[Finding] = []
-    for part, matrix, lead in parts:
+    for part in ("accelerometers", "gyro") if kind == "both" else (kind,):
+        of_gyro = part == "gyro"
+        matrix = match.gyro if of_gyro else match.accelerometers
+        lead = match.gyro_lead if of_gyro else match.accelerometers_lead
         moved = [
             Finding(
                 "crash.axis-opposite" if matrix[i, j] < 0 else "crash.axis-along",
@@ -731,37 +716,25 @@ def axis_findings(match: AxisMatch, first: str, second: str) -> list[Finding]:
 NO_WEIGHT = 1e8
 
 
-def compare_units(
-    units: Sequence[PointKinematics],
-    *,
-    window: tuple[float, float] | None = None,
-    pieces: int = 20,
-    level: float = 1e-3,
-) -> UnitComparison:
+def compare_units(units: Sequence[PointKinematics]) -> UnitComparison:
     """Compare two or more units of one rigid vehicle at one point, pairwise and against their mean.
 
-    `window`, s, by default -0.1 to 0.75 s as far as recorded, is cut into `pieces`, fewer where
-    each would have less than two samples. With the difference d of the velocity increments and its
-    covariance C from all stated uncertainties, ``dᵀ C⁻¹ d`` is chi-square distributed; common
-    errors (a shared gyro, the leveling) cancel in both. A probability below `level` is a
-    disagreement: structural ringing at one position, or any unstated error; so is a single error
-    that explains their differences much better than structure (`single_error`). Assumed axes, and
-    intervals in which a unit was clipped without a wider range, are left out. Each pair is checked
-    for swapped axes, a rotated mounting and wrong positions. `DataError`, `ConfigError`: the window
-    is not covered or too short, an option out of range.
+    The crash, -0.1 to 0.75 s as far as recorded, is cut into `PIECES`, fewer where each would have
+    less than two samples. With the difference d of the velocity increments and its covariance C
+    from all stated uncertainties, ``dᵀ C⁻¹ d`` is chi-square distributed; common errors (a shared
+    gyro, the leveling) cancel in both. A probability below `LEVEL` is a disagreement: structural
+    ringing at one position, or any unstated error; so is a single error that explains their
+    differences much better than structure (`single_error`). Assumed axes, and intervals in which a
+    unit was clipped without a wider range, are left out. Each pair is checked for swapped axes, a
+    rotated mounting and wrong positions. `DataError`, `ConfigError`: the units share no or too
+    short a part.
     """
-    if not (pieces >= 3 and 0.0 < level < 1.0):
-        raise ConfigError(
-            "crash.pieces-level", quantity="pieces, level", pieces=pieces, level=level
-        )
-    edges = common_edges(units, window, pieces)
+    edges = common_edges(units)
     increments = [velocity_increments(u, edges) for u in units]
     cut = [clipped_pieces(u, edges) for u in units]
     rigid = unlearnt(units)
     pairs = tuple(
-        compare_pair(
-            units[i], units[j], increments[i], increments[j], ~(cut[i] | cut[j]), level, rigid
-        )
+        compare_pair(units[i], units[j], increments[i], increments[j], ~(cut[i] | cut[j]), rigid)
         for i, j in itertools.combinations(range(len(units)), 2)
     )
     kept = ~np.any(cut, axis=0)
@@ -790,7 +763,7 @@ def compare_units(
         chi,
         freedom,
         probability,
-        probability >= level and all(p.agree for p in pairs),
+        probability >= LEVEL and all(p.agree for p in pairs),
         structure,
         _turned_by_points(units, common, structure, kept),
         tuple(u.name for u in units if doubted[u.name] or any(f.file == u.name for f in odd)),
@@ -903,14 +876,13 @@ def compare_pair(
     a: VelocityIncrements,
     b: VelocityIncrements,
     kept: Flags,
-    level: float,
     rigid: Structure,
     explained: bool = True,
 ) -> UnitPair:
     """Compare two units over the `kept` intervals of their increments `a` and `b`.
 
-    `level` as `compare_units`; `rigid`: the structural process of the vehicle, without size;
-    `explained`: whether a mounting is looked for that would explain a disagreement.
+    `rigid`: the structural process of the vehicle, without size; `explained`: whether a mounting is
+    looked for that would explain a disagreement.
     """
     edges = a.edges
     a, b = a.of_pieces(kept), b.of_pieces(kept)
@@ -938,7 +910,7 @@ def compare_pair(
     # An axis that is not measured has a variance of zero, or its rounding.
     variance = np.maximum(np.diag(covariance), 0.0)
     force[1, kept] = np.sqrt(variance).reshape(-1, 3) / lengths + told
-    agree, findings = probability >= level, list[Finding]()
+    agree, findings = probability >= LEVEL, list[Finding]()
     whole = not (first.assumed_axes or second.assumed_axes) and bool(kept.any())
     whole = whole and (agree or explained)
     body = body_turning((a, b)) if whole else None
@@ -992,7 +964,7 @@ def compare_pair(
             effects = _single_effects((first, second), stiff, kept, body)
             if body is not None:
                 difference, plain = difference - body.shift, floored(plain - body.known)
-            error = single_error(effects, structure, edges, kept, difference, plain, level)
+            error = single_error(effects, structure, edges, kept, difference, plain, LEVEL)
         if error is not None:
             agree = False
             if error.code == OFF_MOUNTING and turned.sd_deg.max() < math.degrees(MOST_SD):
@@ -1148,13 +1120,8 @@ def _against_all(
     size = increments[0].values.size
     if size == 0:
         none = np.full((kept.size + 1, 3), np.nan)
-        return (
-            none,
-            none,
-            tuple(UnitAgainstAll(u.name, none, none, 0.0, 0, 1.0) for u in units),
-            0.0,
-            0,
-        )
+        against_none = tuple(UnitAgainstAll(u.name, none, none, 0.0, 0, 1.0) for u in units)
+        return none, none, against_none, 0.0, 0
     joint = joint_covariance(increments)
     turning = _turning(units, structure, increments[0].edges, kept)
     if turning is not None:

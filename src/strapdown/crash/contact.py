@@ -30,16 +30,10 @@ UNLIMITED = 1e300
 class Edge:
     """Onset or end of a contact.
 
-    Attributes
-    ----------
-    time, sd : float, s
-    rate : ndarray, (3,), m/s²
-        Acceleration about the edge: change of delta-V per error of `time`.
-    force : ndarray, (3,)
-        Unit vector, horizontal, along which the velocity changes.
-    missing : float, m/s
-        Change of velocity along `force` that may lie outside the record: zero where the record
-        reaches the edge, infinite where the record does not limit that.
+    `time`, `sd`, s. `rate`, (3,), m/s²: acceleration about the edge: change of delta-V per error of
+    `time`. `force`, (3,): unit vector, horizontal, along which the velocity changes. `missing`,
+    m/s: change of velocity along `force` that may lie outside the record: zero where the record
+    reaches the edge, infinite where the record does not limit that.
     """
 
     time: float

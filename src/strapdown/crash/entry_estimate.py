@@ -1044,10 +1044,10 @@ class AtFixes:
 
 def state_at_fixes(run: NavigationRun, course: Course, instants: Array, late: float) -> AtFixes:
     """Interpolate position by Hermite cubics, velocity and attitude by their rates."""
-    # Interpolation requires increasing instants.
-    there = trajectory_at(
-        run.trajectory, instants[::-1], find_ellipsoid(run.mechanization.ellipsoid)
-    )[::-1]
+    # Interpolation requires increasing instants; a speed may be of the instant of a fix.
+    once, back = np.unique(instants, return_inverse=True)
+    there = trajectory_at(run.trajectory, once, find_ellipsoid(run.mechanization.ellipsoid))
+    there = there.iloc[back]
     pushed = np.gradient(run.history[:, 3:6], run.time, axis=0)
     return AtFixes(
         there[GEODETIC].to_numpy(dtype=np.float64),

@@ -16,24 +16,22 @@ from strapdown.crash.acceleration import force_at_rest
 from strapdown.dsp.samples import moving_mean
 from strapdown.errors import DataError
 from strapdown.sensors.crash_unit import (
+    AXES,
+    NO_GYRO,
     SHAPES,
     TURN_SHAPES,
+    TURNS,
     Assumed,
     RecordedTriad,
     assumed_shapes,
+    axis_names,
     turning_shapes,
+    unmeasured_axes,
+    unmeasured_turns,
 )
 from strapdown.sensors.lever_arm import MovedImu, move_unit
 from strapdown.sensors.pre_crash import FROM_GRAVITY, Levelling, PreparedUnit
 from strapdown.sensors.rest import RestStretch
-from strapdown.sensors.unmeasured import (
-    AXES,
-    NO_GYRO,
-    TURNS,
-    axis_names,
-    unmeasured_axes,
-    unmeasured_turns,
-)
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import Array
 

@@ -25,7 +25,7 @@ from strapdown.crash.acceleration import NOISE, by_contributor, window_weights
 from strapdown.crash.entry import Entry, angles_sd
 from strapdown.crash.measuring_point import SampleEffects
 from strapdown.dsp.chi_square import chi_square_quantile
-from strapdown.dsp.cubics import hermite
+from strapdown.dsp.samples import hermite
 from strapdown.earth import earth_rate
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError
@@ -736,14 +736,9 @@ class PathSamples:
 class PathStream:
     """Numbers of one stream of runs.
 
-    Attributes
-    ----------
-    draws : ndarray, (r, p)
-        Standard normal numbers, one for each unknown of the path.
-    noise : tuple of ndarray, (TOGETHER, 6, k)
-        Of each segment of the path: standard normal numbers for angle and velocity of each step.
-    generator : Generator
-        Gives what follows them in the stream.
+    `draws`, (r, p): standard normal numbers, one for each unknown of the path. `noise`, (TOGETHER,
+    6, k): of each segment of the path: standard normal numbers for angle and velocity of each step.
+    `generator`: gives what follows them in the stream.
     """
 
     draws: Array
@@ -755,12 +750,7 @@ class PathStream:
 class PathSampler:
     """Monte Carlo runs of a path, stream by stream: a stream depends on seed and number alone.
 
-    Attributes
-    ----------
-    path : CrashPath
-    seed : int
-    rows : sequence of int, optional
-        Samples of the path at which the runs are wanted, increasing; by default all.
+    `rows`: samples of the path at which the runs are wanted, increasing; by default all.
     """
 
     path: CrashPath

@@ -16,7 +16,16 @@ from strapdown.crash.measuring_point import PointKinematics, at_point
 from strapdown.crash.path import reconstruct_path
 from strapdown.errors import ConfigError, DataError, Finding, add_warning, check_choice
 from strapdown.rotation import level
-from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad, UnitArrays, check_unit
+from strapdown.sensors.crash_unit import (
+    CrashUnit,
+    RecordedTriad,
+    UnitArrays,
+    assumed_findings,
+    check_unit,
+    with_common_assumptions,
+    with_filled_axes,
+    with_gyro,
+)
 from strapdown.sensors.pre_crash import (
     FROM_GRAVITY,
     BiasEstimate,
@@ -38,12 +47,6 @@ from strapdown.sensors.saturation import RangeLimits, find_limits
 from strapdown.sensors.synchronise import SynchronisedUnit, SynchronisedUnits
 from strapdown.sensors.triad_errors import ZERO, Triad, check_sd, finite, span, triad_of, triple
 from strapdown.sensors.uncertainty import TriadUncertainty
-from strapdown.sensors.unmeasured import (
-    assumed_findings,
-    with_common_assumptions,
-    with_filled_axes,
-    with_gyro,
-)
 from strapdown.tables import ACCEL, imu_table
 from strapdown.tables.checks import Array
 

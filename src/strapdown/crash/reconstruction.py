@@ -847,9 +847,7 @@ def wrong_ones(one: VelocityIncrements) -> dict[str, VelocityIncrements]:
     return {code: replace(one, values=moved) for code, moved in values.items()}
 
 
-def undetectable(
-    units: Sequence[PointKinematics], comparison: UnitComparison, level: float = 1e-3
-) -> list[Finding]:
+def undetectable(units: Sequence[PointKinematics], comparison: UnitComparison) -> list[Finding]:
     """State the errors that a comparison of agreeing units would not detect.
 
     Each of `wrong_ones` is put into the record of one unit after another, which is then compared
@@ -862,8 +860,6 @@ def undetectable(
     units : sequence of PointKinematics
         As compared.
     comparison : UnitComparison
-    level : float
-        Probability below which a pair disagrees.
 
     Returns
     -------
@@ -881,7 +877,7 @@ def undetectable(
         for k, unit in enumerate(units):
             pairs = (
                 compare_pair(
-                    *(unit, other, tried[k][code], increments[j], ~(cut[k] | cut[j]), level, rigid),
+                    *(unit, other, tried[k][code], increments[j], ~(cut[k] | cut[j]), rigid),
                     explained=False,
                 )
                 for j, other in enumerate(units)

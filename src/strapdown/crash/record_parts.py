@@ -923,7 +923,8 @@ def _by_gravity_alone(part: Part, known: Sequence[Part]) -> Part | None:
     return _asked(part, "acceleration", said.unit)
 
 
-def _overlaps(a: Part, b: Part) -> bool:
+def overlaps(a: Part, b: Part) -> bool:
+    """Whether two parts are compared: over their common time, in seconds of both."""
     start, end = max(a.time[0], b.time[0]), min(a.time[-1], b.time[-1])
     return bool(end - start >= OVERLAP * min(np.ptp(a.time), np.ptp(b.time)))
 
@@ -933,7 +934,7 @@ def _by_another(part: Part, known: Sequence[Part]) -> Part | None:
         return None
     scales = {u: s for u in INFERRED["accel"] if (s := ACCEL_UNITS[u]) > 0.0}
     for other in sorted(known, key=lambda q: q.path != part.path):
-        slope, correlation = agreement(other, part) if _overlaps(other, part) else (0.0, 0.0)
+        slope, correlation = agreement(other, part) if overlaps(other, part) else (0.0, 0.0)
         if correlation < LEAST_CORRELATION or slope <= 0.0:
             continue
         unit = min(scales, key=lambda u: abs(math.log(slope / scales[u])))
@@ -957,7 +958,7 @@ def _by_elimination(part: Part, known: Sequence[Part]) -> Part | None:
     quiet = quiet_part(values)
     if part.kind == "velocity":
         return _asked(part, "velocity", "km/h")
-    beside = any(q.path == part.path or _overlaps(q, part) for q in known)
+    beside = any(q.path == part.path or overlaps(q, part) for q in known)
     if part.kind == "rate" or (not part.kind and beside and len(part.axes) == 3):
         said = gyro_unit(part.time, values, quiet)
         why = "" if part.kind else "it does not follow the accelerations, and rests near zero"

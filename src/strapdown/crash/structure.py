@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.measuring_point import PointKinematics, SampleEffects
 from strapdown.errors import Finding
-from strapdown.sensors.unmeasured import AXES
+from strapdown.sensors.crash_unit import AXES
 from strapdown.tables.checks import Array
 
 #: Line of the error budget.
@@ -348,16 +348,10 @@ def likeliest(
 class PointContrasts:
     """Differences of the velocity increments of several points, over the m intervals in use.
 
-    Attributes
-    ----------
-    edges : ndarray, (n + 1,), s
-    kept : ndarray of bool, (n,)
-        m of them.
-    values : sequence of ndarray, (j, m), m/s
-        Along each vehicle axis, orthonormal contrasts of the points that measure it: independent
-        of each other, with the structural variance of one point. None or more.
-    shapes : ndarray, (m, q)
-        By which errors of the recorders and the turning of the vehicle change the increments.
+    `edges`, (n + 1,), s. `kept`, (n,): m of them. `values`, (j, m), m/s: along each vehicle axis,
+    orthonormal contrasts of the points that measure it: independent of each other, with the
+    structural variance of one point. None or more. `shapes`, (m, q): by which errors of the
+    recorders and the turning of the vehicle change the increments.
     """
 
     edges: Array
@@ -432,15 +426,9 @@ _QUANTITY = {
 class SingleError:
     """An error that makes the differences of two points likelier than their structure does.
 
-    Attributes
-    ----------
-    code : str
-        A key of `SIZES`.
-    size : ndarray, (r,)
-        Its conditional mean, first point less second: of the scale factor along the force; of the
-        position, true less stated, m; rotation of the second into the first, rad.
-    lead : float
-        Twice the logarithm of the odds against structure alone.
+    `code`: a key of `SIZES`. `size`, (r,): its conditional mean, first point less second: of the
+    scale factor along the force; of the position, true less stated, m; rotation of the second into
+    the first, rad. `lead`: twice the logarithm of the odds against structure alone.
     """
 
     code: str

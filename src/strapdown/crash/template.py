@@ -44,6 +44,7 @@ from strapdown.crash.record_parts import (
     agreement,
     known_force,
     known_path,
+    overlaps,
     quiet_part,
     record_parts,
     settle_units,
@@ -700,8 +701,7 @@ def _one_recorder(group: Sequence[Part], part: Part) -> str:
 def _overlap(a: Part, b: Part) -> bool:
     if a.clock.column == "" or b.clock.column == "":
         return a.path == b.path
-    start, end = max(a.time[0], b.time[0]), min(a.time[-1], b.time[-1])
-    return bool(end - start >= 0.5 * min(np.ptp(a.time), np.ptp(b.time)))
+    return overlaps(a, b)
 
 
 def _instant(part: Part, reach: float) -> float:

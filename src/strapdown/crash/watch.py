@@ -86,14 +86,9 @@ def watch_options(
 ) -> WatchOptions:
     """Options of a recorder from its stated uncertainty; the worse of forward and right is taken.
 
-    Parameters
-    ----------
-    C : array_like, (3, 3)
-        Rotates vectors from the axes of the recorder to those of the vehicle.
-    angles_sd : array_like, (3,), rad
-        Standard deviations of the mounting about forward, right and down.
-    severity : tuple of str, optional
-        By default the models of all crashes.
+    `C`, (3, 3): rotates vectors from the axes of the recorder to those of the vehicle. `angles_sd`,
+    (3,), rad: standard deviations of the mounting about forward, right and down. `severity`: by
+    default the models of all crashes.
     """
     if severity is None:
         severity = tuple(n for n, m in SEVERITY_MODELS.items() if not m.applies)
@@ -278,18 +273,9 @@ class CrashWatch:
 class CrashLog:
     """Detections as plain data, and the samples that were used.
 
-    Parameters
-    ----------
-    every : float, s
-        Least interval between estimates of an event, besides its trigger and its end.
-
-    Attributes
-    ----------
-    lines : list of mapping
-        One for each estimate.
-    accepted : list of list of [int, int]
-        Of each clock, begin and end of each run of accepted samples, counted among all that were
-        taken.
+    `every`, s: least interval between estimates of an event, besides its trigger and its end.
+    `lines`: one for each estimate. `accepted`: of each clock, begin and end of each run of accepted
+    samples, counted among all that were taken.
     """
 
     def __init__(self, options: WatchOptions, every: float = 0.01) -> None:
@@ -324,10 +310,7 @@ class CrashLog:
     def records(self, rows: Array) -> list[Array]:
         """Return the accepted ones among all samples that were taken, of one clock each.
 
-        Parameters
-        ----------
-        rows : ndarray, (n, k)
-            Every sample that was taken, refused ones included.
+        `rows`, (n, k): every sample that was taken, refused ones included.
         """
         return [
             np.concatenate([rows[:0], *(rows[first:end] for first, end in spans)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,44 +54,29 @@ class Delay:
 
     `delay` (s): stamp on the second clock minus stamp on the first, for the same instant. `sd` (s):
     standard deviation, from the residuals, their correlation in time, and the slopes.
-    `correlation`: correlation coefficient at the delay. `runner_up`, `runner_up_delay` (s): the
-    next best peak; 0 and NaN where there is only one. `ambiguous`: whether the next best peak fits
-    about as well. `gain`: second record divided by the first.
+    `correlation`: correlation coefficient at the delay. `gain`: second record divided by the first.
     """
 
     delay: float
     sd: float
     correlation: float
-    runner_up: float
-    runner_up_delay: float
-    ambiguous: bool
     gain: float
 
 
-def find_delay(
-    first: EvenSignal,
-    second: EvenSignal,
-    *,
-    least_shared: float | None = None,
-    near: tuple[float, float] | None = None,
-    refuse_ambiguous: bool = True,
-) -> Delay:
+def find_delay(first: EvenSignal, second: EvenSignal) -> Delay:
     """Estimate the delay of the second record against the first by correlation.
 
     `first`, `second`: any rates; the same number of channels, which show one motion in one unit or
     in proportion, such as magnitudes of vectors, which do not depend on the mounting. Each channel
-    may have a constant offset. `least_shared` (s): smallest overlap; half the shorter record if not
-    given. `near` (s): guess and its half-width: only delays within are searched.
-    `refuse_ambiguous`: raise where another peak fits about as well; otherwise only flag it. Returns
-    both records are decimated to the slower rate, at most 1 kHz. The highest correlation
-    coefficient gives the delay to one sample. Least squares with a gain and constants refines it to
-    a fraction, after the Gaussian smoothing that gives the smallest variance:
-    ``second(t + d) = g first(t) + c``. The variance is ``Σ r_l Σ_i x'_i x'_(i+l)`` over
-    ``(Σ x' y')²``, with the autocovariance r of the residuals. For white residuals it is
-    ``σ²/Σ x'²``, the Cramér-Rao bound for known shapes (Kay, Fundamentals of Statistical Signal
-    Processing I, Eq. (3.14)). Where two points of a vehicle move differently, the difference is
-    part of the residuals. DataError: the numbers of channels differ, the overlap is too short, the
-    signal is constant, or the peak is ambiguous.
+    may have a constant offset. Half the shorter record must overlap. Both records are decimated to
+    the slower rate, at most 1 kHz. The highest correlation coefficient gives the delay to one
+    sample. Least squares with a gain and constants refines it to a fraction, after the Gaussian
+    smoothing that gives the smallest variance: ``second(t + d) = g first(t) + c``. The variance is
+    ``Σ r_l Σ_i x'_i x'_(i+l)`` over ``(Σ x' y')²``, with the autocovariance r of the residuals. For
+    white residuals it is ``σ²/Σ x'²``, the Cramér-Rao bound for known shapes (Kay, Fundamentals of
+    Statistical Signal Processing I, Eq. (3.14)). Where two points of a vehicle move differently,
+    the difference is part of the residuals. DataError: the numbers of channels differ, the overlap
+    is too short, the signal is constant, or the peak is ambiguous.
     """
     one, two = _at_common_rate(first, second)
     step = one.step
@@ -99,31 +84,21 @@ def find_delay(
     for signal, name in ((x, "first"), (y, "second")):
         if not float(np.ptp(signal, axis=0).max()) > 1e-9 * float(np.abs(signal).max()):
             raise DataError("dsp.record-does-not-vary-constants", quantity="values", name=name)
-    least = 0.5 * min(len(x), len(y)) if least_shared is None else least_shared / step
+    least = max(0.5 * min(len(x), len(y)), LEAST_SAMPLES)
     lags, score = lag_correlation(
-        x, y, np.ones(len(x), dtype=bool), np.ones(len(y), dtype=bool), max(least, LEAST_SAMPLES)
+        x, y, np.ones(len(x), dtype=bool), np.ones(len(y), dtype=bool), least
     )
     delays = two.start - one.start - lags * step
-    if near is not None:
-        wanted = np.abs(delays - near[0]) <= near[1]
-        delays, lags, score = delays[wanted], lags[wanted], score[wanted]
     peaks = top_peaks(score, PEAKS) if score.size else np.empty(0, dtype=np.int64)
     if not peaks.size:
         raise DataError(
             "dsp.no-delay-leaves-common-both",
             quantity="time",
-            least=max(least, LEAST_SAMPLES) * step,
+            least=least * step,
         )
     best = int(peaks[0])
     rival = next((int(k) for k in peaks[1:] if _apart(score, best, int(k))), None)
-    runner_up = 0.0 if rival is None else float(score[rival])
-    found = _refine(one, two, float(delays[best]), float(score[best]))
-    result = replace(
-        found,
-        runner_up=runner_up,
-        runner_up_delay=math.nan if rival is None else float(delays[rival]),
-        ambiguous=rival is not None and repeats(float(score[best]), runner_up),
-    )
+    result = _refine(one, two, float(delays[best]), float(score[best]))
     if result.correlation < LEAST_CORRELATION:
         raise DataError(
             "dsp.records-little-common-best-needed",
@@ -131,14 +106,14 @@ def find_delay(
             correlation=result.correlation,
             least_correlation=LEAST_CORRELATION,
         )
-    if result.ambiguous and refuse_ambiguous:
+    if rival is not None and repeats(float(score[best]), float(score[rival])):
         raise DataError(
             "dsp.delays-do-about-well-motion",
             quantity="time",
             delay=result.delay,
-            runner_up_delay=result.runner_up_delay,
+            runner_up_delay=float(delays[rival]),
             score=score[best],
-            runner_up=runner_up,
+            runner_up=float(score[rival]),
         )
     return result
 
@@ -215,7 +190,7 @@ def _least_squares(
     shape = CubicSpline(one.time, one.values)
     slope = CubicSpline(two.time, two.values)(two.time, 1)
     at, limit = delay, (1.5 + 3.0 * width) * one.step
-    nothing = Delay(delay, math.inf, coarse, 0.0, math.nan, False, 1.0)
+    nothing = Delay(delay, math.inf, coarse, 1.0)
     for _ in range(STEPS):
         inside = (two.time - at >= one.time[0]) & (two.time - at <= one.time[-1])
         if inside.sum() < LEAST_SAMPLES:
@@ -242,7 +217,7 @@ def _least_squares(
     felt = gaussian_filter1d(gain * dx, width, axis=0, truncate=TRUNCATE, mode="constant")
     white = float(((felt**2).sum(axis=0) * noise).sum())
     sd = math.sqrt(max(_variance(gain * dx, residual, width), white)) / energy
-    found = Delay(at, sd, max(common, coarse), 0.0, math.nan, False, gain)
+    found = Delay(at, sd, max(common, coarse), gain)
     return found, noise
 
 

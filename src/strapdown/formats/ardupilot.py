@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import re
 import struct
-from collections.abc import Sequence
+from collections.abc import Container, Iterator, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -74,8 +76,13 @@ Record = dict[str, NDArray[Any]]
 _TEXT = re.compile(rb"(?:\A|\n)FMT, ?128, ?89, ?FMT,")
 
 
-# The first record describes itself.
-detect_dataflash = Signs(first=rb"\A\xa3\x95\x80|\AFMT, ?128, ?89, ?FMT,|\nFMT, ?128, ?89, ?FMT,")
+# The first record describes itself. As mavlogdump prints it, the first message is that, or begins
+# with its stamp.
+detect_dataflash = Signs(
+    first=rb"\A\xa3\x95\x80|\AFMT, ?128, ?89, ?FMT,|\nFMT, ?128, ?89, ?FMT,"
+    rb"|(?:\A|\n)\d{4}-\d\d-\d\d [\d:.]+: \w+ \{(?:TimeUS|Type) : "
+    rb'|\A\{"meta": \{"type": "\w+"[^\n]{0,80}"data": \{"(?:TimeUS|Type)": '
+)
 
 
 @lru_cache(maxsize=1)
@@ -84,6 +91,8 @@ def _records(path: Path, stamp: int) -> tuple[dict[str, Record], int]:
     data = path.read_bytes()
     if _TEXT.search(data[:4096]):
         return _records_of_text(data.decode("ascii", "replace"))
+    if not data.startswith(SYNC):
+        return _dumped(data, _RECORDS)
     types: dict[int, tuple[str, list[str], str, int]] = {}
     where: dict[int, list[int]] = {}
     sizes, k, lost = {FMT: FMT_SIZE}, 0, 0
@@ -115,6 +124,75 @@ def _records(path: Path, stamp: int) -> tuple[dict[str, Record], int]:
         }
         out[name]["#"] = np.full(len(table), kind)
     return out, lost
+
+
+#: Records of DataFlash that are read here.
+_RECORDS = frozenset({*DATAFLASH_STREAMS.values(), "GPA", "XKF1", "NKF1"})
+# A message as mavlogdump of pymavlink prints it, and a name in it, before its value.
+_PRINTED = re.compile(r"\d{4}-\d\d-\d\d [\d:.]+: (\w+) \{(.*)\}\s*")
+_NAME = re.compile(r"(?:^|, +)(\w+) : ")
+
+
+def _dumped(data: bytes, wanted: Container[str]) -> tuple[dict[str, Record], int]:
+    """Read the messages of the wanted names that mavlogdump has printed, and count what is lost.
+
+    A line each, as text or JSON; or a table, whose headings have the name before the field, and
+    whose rows have the fields of one message.
+    """
+    lines = data.decode("utf-8", "replace").splitlines()
+    held: dict[str, dict[tuple[str, ...], list[list[Any]]]] = {}
+    lost = 0
+    for name, fields in _of_table(lines) if lines[0].startswith("timestamp") else map(_one, lines):
+        lost += not name
+        if name in wanted:
+            held.setdefault(name, {}).setdefault(tuple(fields), []).append([*fields.values()])
+    out: dict[str, Record] = {}
+    for name, forms in held.items():
+        names, rows = max(forms.items(), key=lambda form: len(form[1]))
+        lost += sum(map(len, forms.values())) - len(rows)
+        columns = dict(zip(names, zip(*rows, strict=True), strict=True))
+        out[name] = {n: array for n, c in columns.items() if (array := _as_numbers(c)) is not None}
+    return out, lost
+
+
+def _one(line: str) -> tuple[str, dict[str, Any]]:
+    """Return name and fields of a message; an empty name if the line is none."""
+    if line.startswith("{"):
+        try:
+            message = json.loads(line)
+            return str(message["meta"]["type"]), dict(message["data"])
+        except (ValueError, KeyError, TypeError, RecursionError):
+            return "", {}
+    match = _PRINTED.fullmatch(line)
+    if match is None:
+        return "", {}
+    parts = _NAME.split(match[2])[1:]
+    return match[1], dict(zip(parts[::2], parts[1::2], strict=True))
+
+
+def _of_table(lines: Sequence[str]) -> Iterator[tuple[str, dict[str, Any]]]:
+    separator = re.sub(r"[\w.]+", "", lines[0])[:1] or ","
+    heads = [head.partition(".") for head in lines[0].strip().split(separator)]
+    for line in lines[1:]:
+        held: dict[str, dict[str, Any]] = {}
+        for (name, _, field), value in zip(
+            heads, line.strip("\r\n").split(separator), strict=False
+        ):
+            if value and field:
+                held.setdefault(name, {})[field] = value
+        yield from held.items()
+
+
+def _as_numbers(values: Sequence[Any]) -> NDArray[Any] | None:
+    """Convert a field of messages; None of a text or an array."""
+    with suppress(ValueError):
+        found = np.array(values)
+        if found.dtype.kind == "U":
+            with suppress(ValueError):
+                return found.astype(np.int64)
+            return found.astype(np.float64)
+        return found if found.ndim == 1 and found.dtype.kind in "if" else None
+    return None
 
 
 def _records_of_text(text: str) -> tuple[dict[str, Record], int]:
@@ -339,7 +417,9 @@ IDS = {
     33: "GLOBAL_POSITION_INT",
     105: "HIGHRES_IMU",
 }
-IMUS = ("HIGHRES_IMU", "SCALED_IMU", "RAW_IMU")
+# Of the second and third sensor of an autopilot, where they are all there is.
+IDS |= {116: "SCALED_IMU2", 129: "SCALED_IMU3"}
+IMUS = ("HIGHRES_IMU", "SCALED_IMU", "RAW_IMU", "SCALED_IMU2", "SCALED_IMU3")
 MAVLINK_STREAMS = {"imu": IMUS, "gnss": ("GPS_RAW_INT",), "reference": ("GLOBAL_POSITION_INT",)}
 MAVLINK_STREAMS |= {"barometer": ("SCALED_PRESSURE",)}
 #: Kind of a fix to field 6 of NMEA GGA.
@@ -355,10 +435,22 @@ detect_mavlink = Signs(
 )
 
 
+# As mavlogdump prints them: text, lines of JSON, or a table of the fields of some messages.
+detect_mavlogdump = Signs(
+    first=rb"(?:\A|\n)\d{4}-\d\d-\d\d [\d:.]+: [A-Z][A-Z\d_]+ \{\w+ : "
+    rb'|\A\{"meta": \{"type": "[A-Z][A-Z\d_]+"[^\n]{0,80}"data": \{"'
+    rb"|\Atimestamp[,;\t ](?:" + "|".join(IDS.values()).encode() + rb")\.\w"
+)
+
+
 @lru_cache(maxsize=1)
 def _messages(path: Path, stamp: int) -> tuple[dict[str, Fields], list[Finding]]:
     """Read the fields of the messages of the vehicle, by their names."""
-    read = parse("recorders.mavlink", path, wanted=list(IDS.items()))
+    if detect_mavlogdump(path):
+        fields, lost = _dumped(path.read_bytes(), {*IDS.values()})
+        read: dict[str, Any] = {"fields": fields, "others": [], "lost": lost}
+    else:
+        read = parse("recorders.mavlink", path, wanted=list(IDS.items()))
     findings: list[Finding] = []
     if read["others"]:
         add_note(
@@ -408,9 +500,8 @@ def read_mavlink(path: Path) -> RawLog:
     fields = log[kind]
     units = {
         "HIGHRES_IMU": ("rad/s", "m/s2", "gauss"),
-        "SCALED_IMU": ("mrad/s", "mg", "mG"),
         "RAW_IMU": (None, None, None),
-    }[kind]
+    }.get(kind, ("mrad/s", "mg", "mG"))
     out: Quantities = {"time": (_time(path, log, kind), "us")}
     for triad, unit in zip(("gyro", "accel"), units[:2], strict=True):
         short = triad.removesuffix("el")

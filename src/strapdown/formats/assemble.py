@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,6 @@ from strapdown.formats.find_columns import (
     reference,
     steady_triads,
     unit_stated,
-    with_reversed,
     without_gyro,
 )
 from strapdown.formats.inference.conclusion import infer_accel, infer_time_unit
@@ -83,7 +83,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     ConfigError: an option names a column that does not exist.
     """
     questions = Questions(raw.name)
-    raw, options = with_reversed(_with_force_of_parts(raw, options), options)
+    raw = _with_force_of_parts(raw, options)
     found = find_columns(raw, options, questions)
     if missing := [q for q in GYRO if q not in found]:
         raise without_gyro(raw, missing)
@@ -133,6 +133,9 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     let_go(values["gyro"])
     axes = body_axes(log)
     units = units_of_triads(log)
+    if "accel" in units and (turned := _in_world_axes(log)) is not None:
+        log.warn("io.left-out-world-axes", "accel", **turned)
+        del units["accel"]
     values = log.values = {t: values[t] for t in units}
     try:
         finite = _finite_rows(log, ticks)
@@ -223,7 +226,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
             to = ("-" if sign < 0 else "") + f"{triad}_{AXES[j]}"
             because = f"{column.why}; unit {why}; axes {axes.why}"
             first = float(begins[triad][axis])
-            readings.append(Reading(column.source, to, unit, because, first))
+            readings.append(Reading(column.written, to, unit, because, first))
     sampling = sampling_of(log, units)
     _report_gaps(log, time, body["gyro"])
     _report_beyond_limits(log, body, kept)
@@ -375,7 +378,7 @@ def _take_memory(log: LogInUse) -> None:
     """Replace the columns of the log by those of triads that were copied."""
     for triad, block in log.values.items():
         for column, values in zip(log.columns(triad), block.T, strict=True):
-            if log.raw.columns[column.source].dtype == values.dtype:
+            if column.sign > 0.0 and log.raw.columns[column.source].dtype == values.dtype:
                 log.raw.columns[column.source] = values
 
 
@@ -586,13 +589,14 @@ def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
         keep = keep & np.isfinite(raw.columns[clock.source]) if clocks else keep
         mine = [clock, *(found[f"{triad}_{a}"] for a in AXES)]
         names = ["time", *(f"{triad}_{a}" for a in AXES)]
+        values = {c.written: raw.columns[c.source][keep] for c in mine}
         parts.append(
             RawLog(
                 name=raw.name,
                 files=raw.files,
-                columns={c.source: raw.columns[c.source][keep] for c in mine},
+                columns=values | {c.written: -values[c.written] for c in mine if c.sign < 0.0},
                 rows=rows[keep],
-                stated={c.source: (n, c.unit) for c, n in zip(mine, names, strict=True)},
+                stated={c.written: (n, c.unit) for c, n in zip(mine, names, strict=True)},
                 findings=[*raw.findings, *left_out] if triad == "gyro" else [],
             )
         )
@@ -1096,6 +1100,53 @@ def _quaternions(raw: RawLog, found: dict[str, Column]) -> tuple[Array | None, l
     q = np.full((len(angles), 4), np.nan)
     q[finite] = rotation.quaternion_from_euler(angles[finite])
     return q, list(EULERS)
+
+
+#: Parts of a log whose mean forces are compared; least tilt, as its sine, by the attitude beside
+#: them; most spread of a force as it stands, relative to that of the force turned by the attitude.
+_PARTS, _TILTED, _STEADIER = 100, 0.1, 0.5
+#: Most samples of a log that are turned for it.
+MOST_TURNED = 20_000
+
+
+def _in_world_axes(log: LogInUse) -> dict[str, Any] | None:
+    """Return the spreads of a force that is steady as it stands, and not by the attitude beside it.
+
+    The force of a sensor turns with it, and the attitude, whichever way it is meant, turns it back:
+    gravity is then steady. A table of motions may have it turned already. A body that banks in its
+    turns looks the same: columns that the user names are the sensor's.
+    """
+    raw, named = log.raw, log.found["accel_x"].basis == "option"
+    if raw.stated or raw.truth is not None or raw.axes is not None or named:
+        return None
+    with suppress(DataError):
+        q, names = _quaternions(raw, log.found)
+        if q is None:
+            return None
+        rows = _known(q) & np.isfinite(log.values["accel"]).all(axis=1)
+        some = slice(None, None, 1 + int(rows.sum()) // MOST_TURNED)
+        force, q = log.values["accel"][rows][some].astype(np.float64), q[rows][some]
+        if len(force) < _PARTS:
+            return None
+        # About one direction, as that of gravity, even a force across it is steady as it stands.
+        mean = rotation.dcm_from_quaternion(q).mean(axis=0)
+        tilt = np.sqrt(max(0.0, 1.0 - float(np.linalg.norm(mean, 2)) ** 2))
+        back = q * [1.0, -1.0, -1.0, -1.0]
+        plain, *turned = map(
+            _spread, (force, rotation.rotate(q, force), rotation.rotate(back, force))
+        )
+        if tilt > _TILTED and plain < _STEADIER * min(turned):
+            columns = [log.found[name].source for name in names]
+            return {"plain": plain, "turned": min(turned), "columns": columns}
+    return None
+
+
+def _spread(force: Array) -> float:
+    """Return the root mean square change of a force between parts of a log, by its size."""
+    parts = force[: len(force) // _PARTS * _PARTS].reshape(_PARTS, -1, 3).mean(axis=1)
+    size = float(np.linalg.norm(parts, axis=1).mean())
+    change = float(np.sqrt(np.square(parts - parts.mean(axis=0)).sum(axis=1).mean()))
+    return change / size if size > 0.0 else 0.0
 
 
 def _sensor_from_body(raw: RawLog, axes: Turn) -> Array:

@@ -19,6 +19,7 @@ from strapdown.formats.vocabularies import (
     CHIP,
     CLOCKS,
     COUNTERS,
+    CRASHES,
     DIRECTIONS,
     LOGS,
     MAGNETIC,
@@ -66,6 +67,7 @@ _HUMPS = re.compile(
 # Between a script of Asia and a letter, which is an axis.
 _SCRIPTS = re.compile(r"(?<=[\u2e80-\uffef])(?=[a-zA-Z])|(?<=[a-zA-Z])(?=[\u2e80-\uffef])")
 _SIGNS = r"[\s_\-/:,;|.#]+"
+_SIGNS_AND_BRACKETS = r"[\s_\-/:,;|.#()\[\]]+"
 # Text in brackets at the end, which may hold brackets: (m/(s*s)).
 _BRACKETS = re.compile(r"[\[(]\s*((?:[^\[\]()]|\([^()]*\))*?)\s*[\])]\s*$")
 # A unit before the axis: Angular velocity (deg/s) X, of a heading in two rows.
@@ -147,6 +149,8 @@ def _read_name(name: str, of: Vocabulary, unit: str) -> ColumnName:
         if not of.sensors:
             return ColumnName(None)  # q[0] is a part of an array, not a column q in units of 0
         text, index = match.groups()
+    if of.stems and (code := _of_code(text, unit)) is not None:
+        return code
     if not of.sensors and len(text) <= LONGEST:
         text = _HEMISPHERE.sub(r"\1", text)
     said = _of_format(text, index) if of.sensors else None
@@ -184,6 +188,25 @@ def split_brackets(text: str) -> tuple[str, str]:
     if bracket is None or text[: bracket.start()].rstrip().endswith(("/", "^")):
         return text, ""
     return text[: bracket.start()], bracket.group(1)
+
+
+def _of_code(text: str, unit: str) -> ColumnName | None:
+    """Read a channel code of ISO MME, which a table has as a name; None for another name.
+
+    What moves with a body of its own, as an occupant's head, is none of the vehicle.
+    """
+    from strapdown.formats.mme_codes import DIMENSIONS, decode_mme
+
+    bare, bracket = split_brackets(text)
+    code = decode_mme(bare)
+    if code is None or not code.vehicle or code.code[12:14] not in DIMENSIONS:
+        return None
+    return ColumnName(
+        code.quantity if code.body == "vehicle" else "other",
+        unit_of(bracket or unit, CRASHES.kinds),
+        family=code.code[:12].lower(),
+        axis=code.axis,
+    )
 
 
 def _of_format(text: str, index: str) -> ColumnName | None:
@@ -309,7 +332,8 @@ def clocks_with_unit(names: list[str], has_unit: Callable[[str], bool]) -> list[
 
 
 def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> ColumnName:
-    word = "".join(re.split(_SIGNS, text.lower()))
+    # Brackets before those of the unit hold a word of the name: GPS (Lat.) [deg].
+    word = "".join(re.split(_SIGNS if of.sensors else _SIGNS_AND_BRACKETS, text.lower()))
     if (said := _known(word, of)) and not said.loose:
         return replace(said, unit=unit or said.unit)
     rest = word

@@ -56,16 +56,28 @@ class Column:
     """The column of a file that holds a quantity.
 
     `basis` ({'name', 'file', 'option', 'numbers', 'open'}): what assigns it to the quantity.
+    `sign`: -1 of a column that counts the other way, which the user names with a minus.
     """
 
     source: str
     unit: str | None
     basis: Basis
+    sign: float = 1.0
 
     @property
     def why(self) -> str:
         """The basis in words, as a `Reading` shows it."""
         return _WHY[self.basis]
+
+    @property
+    def written(self) -> str:
+        """The column as the user names it: with its minus."""
+        return f"-{self.source}" if self.sign < 0.0 else self.source
+
+    def values(self, raw: RawLog, quantity: str) -> NDArray[Any]:
+        """Return the numbers of the quantity in the column's unit; as `numbers`."""
+        found = numbers(raw, self.source, quantity)
+        return found if self.sign > 0.0 else -np.asarray(found, dtype=np.float64)
 
 
 def find_columns(
@@ -81,6 +93,7 @@ def find_columns(
     """
     asked_here = questions or Questions(raw.name)
     wanted: dict[str, str] = {}
+    signs: dict[str, float] = {}
     inferred: set[str] = set()
     for quantity, source in options.columns.items():
         if quantity not in QUANTITIES and quantity not in TRIADS:
@@ -91,12 +104,15 @@ def find_columns(
                 word=quantity,
                 known=[*QUANTITIES, *TRIADS],
             )
-        for q, name in _asked(raw, quantity, source):
+        triad = quantity.partition("_")[0]
+        itself = triad not in TRIADS or (quantity in TRIADS and _three_of(raw, quantity, source))
+        plain, sign = (source, 1.0) if itself else _without_minus(source, raw.columns)
+        for q, name in _asked(raw, quantity, plain):
             if name in wanted.values():
                 raise ConfigError(
                     "io.column-named-twice", file=raw.name, quantity=f"--columns {q}", name=name
                 )
-            wanted[q] = name
+            wanted[q], signs[q] = name, sign
             inferred |= {q} if quantity in options.inferred else set()
     # Triads that are not asked for are those of the unit of which one is.
     of_units = (unit for unit in raw.other_units if not set(wanted.values()).isdisjoint(unit))
@@ -116,7 +132,7 @@ def find_columns(
     for q, name in wanted.items():
         stated = found[q].unit if q in found and found[q].source == name else None
         basis: Basis = "open" if q in inferred else "option"
-        found[q] = Column(name, unit_stated(raw, name) or stated, basis)
+        found[q] = Column(name, unit_stated(raw, name) or stated, basis, signs[q])
     if not (raw.stated or wanted.keys() & {"gyro_x", "accel_x"}):
         _ask_parts(raw, found, asked_here)
     if questions is None:
@@ -148,38 +164,23 @@ def _ask_parts(raw: RawLog, found: Mapping[str, Column], questions: Questions) -
         questions.ask(fault, **columns)
 
 
-def with_reversed(raw: RawLog, options: ReadOptions) -> tuple[RawLog, ReadOptions]:
-    """Return a log with the columns that the user names with a minus reversed, and named so.
-
-    ``gyro_z=-gz`` names the column ``gz``, whose numbers count the other way: it becomes ``-gz``.
-    A file may have a column of that name already. ConfigError: as of `find_columns`.
-    """
-    columns = dict(options.columns)
-    reversed_: dict[str, str] = {}
-    for quantity, source in options.columns.items():
-        triad = quantity.partition("_")[0]
-        if not source.startswith("-") or source in raw.columns or triad not in TRIADS:
-            continue
-        if quantity in TRIADS and _three_of(raw, quantity, source):
-            continue
-        plain = source.removeprefix("-")
-        names = [name for _, name in _asked(raw, quantity, plain)]
-        reversed_ |= {name: f"-{name}" for name in names}
-        if quantity not in TRIADS:
-            columns[quantity] = f"-{names[0]}"
-    if not reversed_:
-        return raw, options
-    held = {
-        reversed_.get(name, name): -np.asarray(numbers(raw, name, name), dtype=np.float64)
-        if name in reversed_
-        else values
+def as_found(raw: RawLog, found: Mapping[str, Column]) -> RawLog:
+    """Return a log that states the columns that were found; those with a minus are reversed."""
+    turned = {c.source: c for c in found.values() if c.sign < 0.0}
+    names = {name: turned[name].written if name in turned else name for name in raw.columns}
+    columns = {
+        names[name]: turned[name].values(raw, name) if name in turned else values
         for name, values in raw.columns.items()
     }
-    units = {reversed_.get(name, name): unit for name, unit in raw.units.items()}
-    stated = {reversed_.get(name, name): one for name, one in raw.stated.items()}
-    others = [{reversed_.get(n, n): q for n, q in unit.items()} for unit in raw.other_units]
-    raw = replace(raw, columns=held, units=units, stated=stated, other_units=others)
-    return raw, replace(options, columns=columns)
+    units = {names.get(name, name): unit for name, unit in raw.units.items()}
+    stated = {c.written: (q, c.unit) for q, c in found.items()}
+    return replace(raw, columns=columns, units=units, stated=stated)
+
+
+def _without_minus(name: str, columns: Iterable[str]) -> tuple[str, float]:
+    """Split the minus off a column that counts the other way; a column may have that name."""
+    turned = name.startswith("-") and name not in columns
+    return (name[1:], -1.0) if turned else (name, 1.0)
 
 
 def names_of_quantities(raw: RawLog) -> set[str]:
@@ -193,7 +194,10 @@ def without_gyro(raw: RawLog, missing: list[str]) -> DataError:
     """Make the error for a log without three rates; the message lists its columns."""
     if _is_nameless(raw):
         return DataError(_nameless(raw, {}))
-    said = {name: str(read_name(name).quantity) for name in raw.columns}
+    said = {
+        name: raw.stated[name][0] if name in raw.stated else str(read_name(name).quantity)
+        for name in raw.columns
+    }
     force = [n for n, q in said.items() if q.startswith("accel_")]
     force = force if {said[n][-1] for n in force} == set(AXES) else _letters_of_g(raw, said)
     # The letter g alone is as often a force.
@@ -393,6 +397,8 @@ COMPARED, MOST_SAMPLES, SPANS = 64, 6000, (25, 100, 200)
 FEWEST_CHANGES = 8
 #: Least share of the changes that a gyro explains, and how far below the best the first may be.
 LEAST, NEAR = 0.8, 0.1
+#: Largest error of the norm of a quaternion: of four numbers written with three decimals.
+UNIT_NORM = 2e-3
 #: Least turn of a force in all, rad.
 TURNED = 0.05
 
@@ -404,6 +410,8 @@ def rates_and_force(columns: list[NDArray[np.generic]]) -> tuple[int, int] | Non
     triads explains the motion.
     """
     held = [_varied(c) for c in columns[:COMPARED]]
+    for k in _of_quaternions(columns[:COMPARED]):
+        held[k] = None
     triads: dict[int, Array] = {}
     for k in range(len(held) - 2):
         columns_of = [c for c in held[k : k + 3] if c is not None]
@@ -424,6 +432,21 @@ def rates_and_force(columns: list[NDArray[np.generic]]) -> tuple[int, int] | Non
     if best < LEAST:
         return None
     return min(pair for pair, share in shares.items() if share > best - NEAR)
+
+
+def _of_quaternions(columns: list[NDArray[np.generic]]) -> set[int]:
+    """Return the numbers of columns of which four neighbors are a quaternion of unit norm.
+
+    Its parts turn, too, and three of them may have a steady norm.
+    """
+    out: set[int] = set()
+    for k in range(len(columns) - 3):
+        four = columns[k : k + 4]
+        if all(c.dtype.kind == "f" for c in four):
+            values = np.column_stack([c[:MOST_SAMPLES] for c in four]).astype(np.float64)
+            off = np.abs(np.linalg.norm(values, axis=1) - 1.0)
+            out |= set(range(k, k + 4)) if bool((off < UNIT_NORM).all()) else set()
+    return out
 
 
 def _explained(turned: Array, force: Array, span: int) -> float:
@@ -917,16 +940,15 @@ def find_quantities(
                 word=quantity,
                 known=known,
             )
-        # A column that counts the other way, of a quantity with a sign.
-        minus = name.startswith("-") and name not in columns and bool(known[quantity].units)
-        name = name.removeprefix("-") if minus and quantity != "time" else name
+        with_sign = bool(known[quantity].units) and quantity != "time"
+        name, sign = _without_minus(name, columns) if with_sign else (name, 1.0)
         if name not in columns and name.isdecimal() and 1 <= int(name) <= len(columns):
             name = columns[int(name) - 1]
         check_choice(
             "io.no-column-3", columns, quantity=f"columns {quantity}", file=file, name=name
         )
         wanted[name] = quantity
-        signs |= {name: -1.0} if minus else {}
+        signs |= {name: -1.0} if sign < 0.0 else {}
     found: dict[str, Found] = {}
     read = {name: read_name(name, of, (units or {}).get(name, "")) for name in columns}
     for evidence in range(3):

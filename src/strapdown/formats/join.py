@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from strapdown.constants import Array
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning
-from strapdown.formats.arrays import numbers, ticks_of
-from strapdown.formats.find_columns import Column, find_columns, with_reversed
+from strapdown.formats.arrays import ticks_of
+from strapdown.formats.find_columns import Column, as_found, find_columns
 from strapdown.formats.inference.conclusion import infer_time_unit
 from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.formats.vocabularies import QUANTITIES
@@ -185,10 +185,7 @@ def _onto(
 ) -> tuple[Array | None, NDArray[np.bool_]]:
     """Return a triad at the stamps of the gyro, and where it has values."""
     values = np.column_stack(
-        [
-            numbers(log, theirs[f"{triad}_{a}"].source, f"{triad}_{a}").astype(np.float64)
-            for a in AXES
-        ]
+        [theirs[f"{triad}_{a}"].values(log, f"{triad}_{a}").astype(np.float64) for a in AXES]
     )
     origin, clock = clock_of(gyro, own), clock_of(log, theirs)
     if (origin.unit is None) != (clock.unit is None):
@@ -315,8 +312,6 @@ def with_columns(logs: Sequence[RawLog], options: ReadOptions) -> list[RawLog]:
             )
     out = []
     for log, its in zip(logs, asked, strict=True):
-        log, own = with_reversed(log, dataclasses.replace(options, columns=its))
-        found = find_columns(log, own)
-        stated = {c.source: (q, c.unit) for q, c in found.items()}
-        out.append(dataclasses.replace(log, stated=stated) if its else log)
+        own = dataclasses.replace(options, columns=its)
+        out.append(as_found(log, find_columns(log, own)) if its else log)
     return out

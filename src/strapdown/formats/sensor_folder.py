@@ -17,16 +17,18 @@ from pathlib import Path, PurePosixPath
 from strapdown.errors import DataError, add_note
 from strapdown.formats import csv
 from strapdown.formats.columns import read_name
+from strapdown.formats.csv import of_arrays
 from strapdown.formats.find_columns import AXES, find_columns
 from strapdown.formats.inference.conclusion import EPOCH
 from strapdown.formats.join import join
-from strapdown.formats.recording import RawLog, ReadOptions
+from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions
 from strapdown.formats.signs import Signs, while_unchanged
 from strapdown.formats.text_columns import fields_of
 from strapdown.formats.vocabularies import WITHOUT_GRAVITY
 from strapdown.parsers import parse
 from strapdown.units import TIME_UNITS
 
+TITLE = "folder or zip of one text table a sensor"
 _TRIADS = {"gyro": "gyro", "accel": "accel", "mag": "mag", "magnetometer": "mag"}
 #: Words of a table that has no gravity, or that its device did not correct.
 _NOT_A_TRIAD = {*WITHOUT_GRAVITY, "gravity", "uncalibrated"}
@@ -65,9 +67,47 @@ def read(path: Path) -> RawLog:
             "io.no-table-gyro-holds", file=name, quantity="gyro", held=held or "nothing"
         )
     raw = join([_log(m) for m in tables], name, rows_of_member=True)
-    if others := [m.name for m in members if m.suffix in csv.SUFFIXES and m not in tables]:
+    fixes = _table_of_fixes(members)
+    left = [m for m in members if m not in tables and m != fixes]
+    if others := [m.name for m in left if m.suffix in csv.SUFFIXES]:
         add_note(raw.findings, "io.tables-not-used", file=name, names=others)
     return raw
+
+
+TABLE_TITLE = "text table of one sensor, in its name"
+
+
+def _is_of_one_sensor(path: Path) -> bool:
+    """Whether a table of its own is named after a sensor, in a word, and its columns x, y and z."""
+    table = file_member(path)
+    in_words = re.search(r"[A-Za-z]{3}", table.stem) is not None
+    return in_words and _triad(table) is not None and _has_bare_axes(table)
+
+
+detect_table = Signs(suffixes=csv.SUFFIXES, also=_is_of_one_sensor)
+
+
+def read_table(path: Path) -> RawLog:
+    """Read the table of one sensor, after which it is named."""
+    return _log(file_member(path))
+
+
+def read_fixes(path: Path) -> RawLog:
+    """Read the table of positions beside those of sensors.
+
+    NoStreamError: none has latitude and longitude.
+    """
+    found = _table_of_fixes(members_of(path))
+    if found is None:
+        raise NoStreamError(path.resolve().name, "gnss", TITLE, ["imu"])
+    return csv.parse(found.read(), found.label, (found.file,))
+
+
+def _table_of_fixes(members: list[Member]) -> Member | None:
+    """Return the one table whose names say latitude and longitude, if there is just one."""
+    tables = [m for m in members if m.suffix in csv.SUFFIXES]
+    found = [m for m in tables if csv.are_fixes(fields_of(first_line(m)))]
+    return found[0] if len(found) == 1 else None
 
 
 def _triad(member: Member) -> str | None:
@@ -79,13 +119,24 @@ def _triad(member: Member) -> str | None:
     if said in _TRIADS or _NOT_A_TRIAD & {w.lower() for w in words}:
         return _TRIADS.get(said)
     kinds = {_TRIADS.get(str(read_name(word).quantity)) for word in words} - {None}
-    return kinds.pop() if len(kinds) == 1 and _has_axes(member) else None
+    kind = str(kinds.pop()) if len(kinds) == 1 else ""
+    return kind if kind and _has_axes(member, kind) else None
 
 
-def _has_axes(member: Member) -> bool:
-    line = first_line(member)
-    fields = fields_of(line)
-    return sorted(m[1].lower() for f in fields if (m := _AXIS.fullmatch(f.strip()))) == [*AXES]
+def _has_bare_axes(member: Member) -> bool:
+    """Whether a table names columns x, y and z."""
+    fields = [f.strip() for f in fields_of(first_line(member))]
+    return sorted(m[1].lower() for f in fields if (m := _AXIS.fullmatch(f))) == [*AXES]
+
+
+def _has_axes(member: Member, triad: str) -> bool:
+    """Whether a table names axes, bare or as those of its sensor and of no other."""
+    if _has_bare_axes(member):
+        return True
+    fields = [f.strip() for f in fields_of(first_line(member))]
+    said = [str(read_name(name).quantity) for name in of_arrays(fields)]
+    of_sensors = sorted(q for q in said if q.partition("_")[0] in _TRIADS)
+    return of_sensors == [f"{triad}_{axis}" for axis in AXES]
 
 
 def _log(member: Member) -> RawLog:

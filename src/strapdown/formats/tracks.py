@@ -1,4 +1,4 @@
-"""Positions of watches, receivers and drones: Garmin FIT, GPX, KML, GeoJSON, subtitles of DJI."""
+"""Positions of watches, receivers, drones: Garmin FIT and TCX, GPX, KML, IGC, GeoJSON, DJI."""
 
 from __future__ import annotations
 
@@ -143,6 +143,89 @@ def _of_track(
     ticks = dates.dt.tz_localize(None).to_numpy().astype("datetime64[ns]").astype(np.int64)
     seconds[timed] = ticks / 1e9
     return _points_with_time(RawLog.of(path, {"time": (seconds, "s"), **held}, clock=UNIX), timed)
+
+
+# TCX (https://www8.garmin.com/xmlschemas/TrainingCenterDatabasev2.xsd): points of laps. The schema
+# does not say from which level heights count; devices take them from the sea, or a barometer.
+
+
+detect_tcx = Signs(text=r"\A[\s\S]{0,4092}?<(?:\w+:)?TrainingCenterDatabase[\s>]")
+
+
+def read_tcx_fixes(path: Path) -> RawLog:
+    """Read the points that have a position and a time.
+
+    Raises
+    ------
+    DataError
+        The XML is damaged, or no point has a position and a time.
+    """
+    points = parse("recorders.tcx", path)
+    timed = np.array([t is not None for t in points["time"]], dtype=bool)
+    if not timed.any():
+        raise DataError("io.track-without-time", file=path.name, quantity="time", count=timed.size)
+    places = np.array(points["place"], dtype=np.float64)
+    held = {"lat": (places[:, 1], "deg"), "lon": (places[:, 0], "deg")}
+    if np.isfinite(places[:, 2]).any():
+        held["alt_unstated"] = (places[:, 2], "m")
+    return _of_track(path, points["time"], held, timed)
+
+
+# IGC (FAI, Technical Specification for GNSS Flight Recorders, appendix A): a line ``B`` a fix: time
+# of day in UTC, degrees and thousandths of minutes, validity, pressure and GNSS altitude. A line
+# ``HFDTE`` has the date, and ``HFALG`` says whether altitudes are over the ellipsoid or the geoid.
+
+
+detect_igc = Signs(text=r"\AA[A-Z0-9]{3}[\s\S]*?^HFDTE")
+_DATE_OF_IGC = re.compile(r"^HFDTE(?:DATE:)?(\d\d)(\d\d)(\d\d)", re.M)
+_FIX_OF_IGC = re.compile(
+    r"^B(\d\d)(\d\d)(\d\d)(\d\d)(\d{5})([NS])(\d{3})(\d{5})([EW])([AV])(-?\d{4,5})(-?\d{4,5})", re.M
+)
+_LEVEL_OF_IGC = re.compile(r"^HFALG[^:\n]*:\s*(ELL|GEO)", re.M)
+
+
+def read_igc_fixes(path: Path) -> RawLog:
+    """Read the fixes with an altitude of the receiver; the others are left out with a note.
+
+    Raises
+    ------
+    DataError
+        The file has no date, or no such fix.
+    """
+    text = path.read_bytes().decode("latin-1")
+    date, fixes = _DATE_OF_IGC.search(text), [m.groups() for m in _FIX_OF_IGC.finditer(text)]
+    whole = [fix for fix in fixes if fix[9] == "A"]
+    if date is None or not whole:
+        raise DataError("io.track-without-time", file=path.name, quantity="time", count=len(fixes))
+    day, month, year = map(int, date.groups())
+    century = 1900 if year >= 80 else 2000  # the first recorders are of the eighties
+    try:
+        midnight = datetime(century + year, month, day, tzinfo=UTC).timestamp()
+    except ValueError:
+        text = date[0]
+        raise DataError("io.track-time-no-date", file=path.name, row=1, text=text) from None
+    hour, minute, second = np.array([fix[:3] for fix in whole], dtype=np.float64).T
+    time = 3600.0 * hour + 60.0 * minute + second
+    days = np.concatenate([[0], np.cumsum(np.diff(time) < -43200.0)])
+
+    def angle(degrees: int, negative: str) -> NDArray[np.float64]:
+        parts = np.array([fix[degrees : degrees + 2] for fix in whole], dtype=np.float64)
+        signs = np.where([fix[degrees + 2] == negative for fix in whole], -1.0, 1.0)
+        return np.asarray(signs * (parts[:, 0] + parts[:, 1] / 60e3))
+
+    level = _LEVEL_OF_IGC.search(text)
+    height = {"ELL": "alt", "GEO": "alt_msl", "": "alt_unstated"}[level[1] if level else ""]
+    held = {
+        "time": (midnight + 86400.0 * days + time, "s"),
+        "lat": (angle(3, "S"), "deg"),
+        "lon": (angle(6, "W"), "deg"),
+        height: (np.array([fix[11] for fix in whole], dtype=np.float64), "m"),
+    }
+    log = RawLog.of(path, held, clock=UNIX)
+    if lost := len(fixes) - len(whole):
+        code = "io.fixes-without-position-left-out"
+        add_note(log.findings, code, file=path.name, count=lost)
+    return log
 
 
 # GeoJSON (RFC 7946): points with a time among their properties, or paths with the times of their

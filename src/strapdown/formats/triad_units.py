@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY, Array
 from strapdown.errors import ConfigError, DataError, Finding, add_note, add_warning, check_choice
-from strapdown.formats.arrays import as_rows, numbers
+from strapdown.formats.arrays import as_rows
 from strapdown.formats.columns import parse_axes, read_name
 from strapdown.formats.find_columns import AXES, Column, reference, stated_word
 from strapdown.formats.inference.conclusion import THRESHOLD, Inference
@@ -452,8 +452,7 @@ def values_of_triads(log: LogInUse) -> dict[str, Array]:
 def _triad(log: LogInUse, triad: str) -> Array:
     columns = log.columns(triad)
     parts = [
-        numbers(log.raw, column.source, f"{triad}_{a}")
-        for column, a in zip(columns, AXES, strict=True)
+        column.values(log.raw, f"{triad}_{a}") for column, a in zip(columns, AXES, strict=True)
     ]
     stated, known = [str(c.unit) for c in columns], UNITS[triad]
     by_user = getattr(log.options, f"{triad}_unit", None)
@@ -649,6 +648,8 @@ def _report_contradictions(log: LogInUse, units: dict[str, str], asked: set[str]
         ):
             fault = Finding("io.contradicts-unit", **data, likely=instead, reason=other.finding())
             log.questions.ask(fault, gyro_unit=instead)
+        elif triad == "gyro" and "accel" in units and (stood := _stood_still(unit, other)):
+            log.warn("io.gravity-stood-still", "accel", reason=stood)
         if not other.settled:
             continue
         # Sizes of rates alone do not contradict a statement: gravity that rotated with them
@@ -702,11 +703,17 @@ def _other_columns(log: LogInUse, axes: str) -> str:
     columns = []
     for axis, along in zip(AXES, axes.split(","), strict=True):
         if axis != along:
-            name = log.found[f"gyro_{along[-1]}"].source
-            plain = reference(log.raw, name).removeprefix("-")
-            reversed_ = name.startswith("-") != along.startswith("-")
-            columns.append(f"gyro_{axis}={'-' if reversed_ else ''}{plain}")
+            of = log.found[f"gyro_{along[-1]}"]
+            reversed_ = (of.sign < 0.0) != along.startswith("-")
+            minus = "-" if reversed_ else ""
+            columns.append(f"gyro_{axis}={minus}{reference(log.raw, of.source)}")
     return ",".join(columns)
+
+
+def _stood_still(unit: str, inferred: Inference) -> Finding | None:
+    """Return the evidence that gravity stood still where a gyro in this unit turns it."""
+    of_unit = (e for e in inferred.evidence if e.data.get("unit") == unit)
+    return next((e for e in of_unit if e.code == "io.evidence-gravity-stood-still"), None)
 
 
 def _instead(unit: str, inferred: Inference, scale: Inference | None = None) -> str | None:
@@ -714,10 +721,7 @@ def _instead(unit: str, inferred: Inference, scale: Inference | None = None) -> 
 
     The numbers need not settle which of the others it is.
     """
-    if not any(
-        e.code == "io.evidence-gravity-stood-still" and e.data["unit"] == unit
-        for e in inferred.evidence
-    ):
+    if _stood_still(unit, inferred) is None:
         return None
     shares = dict(((inferred.value, inferred.confidence), *inferred.alternatives))
     others = [str(u) for u in shares if u not in (unit, None)]

@@ -467,9 +467,10 @@ FIXES = Vocabulary(
         ),
         "speed": Quantity(
             _words(
-                "speed sog gspeed groundspeed locationspeed speedoverground gndspd spd "
-                "geschwindigkeit vitesse velocidad velocità velocita snelheid hastighet prędkość "
-                "enhancedspeed predkosc rychlost brzina rapidez скорость 速度 车速 航速 속도"
+                "speed 2dspeed speed2d sog gspeed groundspeed locationspeed speedoverground gndspd "
+                "spd geschwindigkeit vitesse velocidad velocità velocita snelheid hastighet "
+                "prędkość enhancedspeed predkosc rychlost brzina rapidez скорость 速度 车速 航速 "
+                "속도"
             ),
             SPEEDS,
         ),

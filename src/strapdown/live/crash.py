@@ -19,7 +19,6 @@ from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.watch import CrashLog, CrashWatch, WatchOptions, watch_options
 from strapdown.errors import DataError, Finding
 from strapdown.formats.stamp_gate import StampGate
-from strapdown.live.gate import FAMILY, STRONGEST, ValueLimits
 from strapdown.live.journal import Journal, SpooledRows
 from strapdown.live.lines import (
     END,
@@ -30,6 +29,7 @@ from strapdown.live.lines import (
     count_unused,
     parse_line,
 )
+from strapdown.live.reception import FAMILY, STRONGEST, ValueLimits
 from strapdown.live.replay import LatencyTape, RunClock
 from strapdown.live.run import received_lines, until_a_signal
 from strapdown.live.sources import LineSource, ReceivedLine

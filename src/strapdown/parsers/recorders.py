@@ -165,7 +165,7 @@ def fit(path: Path, wanted: Sequence[str]) -> dict[str, list[dict[str, Any]]]:
 def gpx(path: Path) -> dict[str, list[Any]]:
     """Return the points of all tracks, by field; ``time`` in s since 1970, None if not stated."""
     gpxpy = library("gpxpy", path)
-    with damage("io.gpx-unreadable", path):
+    with damage("io.track-unreadable", path, title="GPX"):
         tracks = gpxpy.parse(path.read_bytes()).tracks
         points = [p for track in tracks for part in track.segments for p in part.points]
         times = [
@@ -187,7 +187,7 @@ def kml(path: Path) -> dict[str, list[Any]]:
     ``mode``: of its altitude. The elements of OGC KML 2.3: ``Track`` with ``when`` and ``coord``,
     and a ``Placemark`` of a ``TimeStamp`` and a ``Point``.
     """
-    with damage("io.kml-unreadable", path):
+    with damage("io.track-unreadable", path, title="KML"):
         data = path.read_bytes()
         if data[:2] == b"PK":
             with zipfile.ZipFile(path) as archive:
@@ -216,6 +216,33 @@ def kml(path: Path) -> dict[str, list[Any]]:
             out["time"] += [*texts["when"], *[None] * len(places)][: len(places)]
             out["place"] += places
             out["mode"] += [mode] * len(places)
+        return out
+
+
+def tcx(path: Path) -> dict[str, list[Any]]:
+    """Return the points with a position of all laps of a TCX file, by field; as `kml`.
+
+    The elements of Garmin's TrainingCenterDatabase v2: ``Trackpoint`` with ``Time``, ``Position``
+    and ``AltitudeMeters``. A lap begins with the last point of the one before it, which counts
+    once. ``Courses`` are planned: their times are of nobody.
+    """
+    with damage("io.track-unreadable", path, title="TCX"):
+        out: dict[str, list[Any]] = {"time": [], "place": []}
+        before: Any = None
+        parts = [p for p in ElementTree.fromstring(path.read_bytes()) if _tag(p) != "Courses"]
+        for point in (one for part in parts for one in part.iter()):
+            if _tag(point) != "Trackpoint":
+                continue
+            said = {_tag(part): str(part.text or "").strip() for part in point.iter()}
+            if not {"LatitudeDegrees", "LongitudeDegrees"} <= said.keys():
+                continue
+            names = ("LongitudeDegrees", "LatitudeDegrees", "AltitudeMeters")
+            place = [float(said.get(name) or "nan") for name in names]
+            this = (said.get("Time") or None, *place[:2])
+            if this != before:
+                out["time"].append(this[0])
+                out["place"].append(place)
+            before = this
         return out
 
 

@@ -96,12 +96,8 @@ class Line:
 class Fill:
     """A band between two curves, below every line: a bound or an assumption.
 
-    Attributes
-    ----------
-    name : str
-        Legend entry; a line of the same name shares it.
-    x, low, high : ndarray, (n,)
-        NaN in `low` or `high` breaks the band.
+    `name`: legend entry; a line of the same name shares it. `x`, `low`, `high`, (n,): NaN in `low`
+    or `high` breaks the band.
     """
 
     name: str
@@ -117,22 +113,11 @@ class Fill:
 class Bars:
     """Bars: horizontal in a panel of categories, else upright.
 
-    Attributes
-    ----------
-    name : str
-        Legend entry; bars of one name share an entry.
-    at : ndarray, (n,)
-        Middle of each bar: the number of a category, or a value of the horizontal axis.
-    values : ndarray, (n,)
-        End of each bar.
-    start : ndarray, (n,), or None
-        Start of each bar; zero by default.
-    width : float
-        In the unit of `at`.
-    pattern : {'', '/', 'x', '-', '|', '+', '.'}
-        Distinguishes bars without color.
-    labels : tuple of str
-        One per bar, at its end, or none.
+    `name`: legend entry; bars of one name share an entry. `at`, (n,): middle of each bar: the
+    number of a category, or a value of the horizontal axis. `values`, (n,): end of each bar.
+    `start`, (n,), or None: start of each bar; zero by default. `width`: in the unit of `at`.
+    `pattern`, {'', '/', 'x', '-', '|', '+', '.'}: distinguishes bars without color. `labels`: one
+    per bar, at its end, or none.
     """
 
     name: str
@@ -175,11 +160,8 @@ class Band:
 class Picture:
     """A picture in a plane: a square from one corner along two sides.
 
-    Attributes
-    ----------
-    media : {'png', 'jpeg', 'webp'}
-    corner, across, down : ndarray, (2,)
-        Upper left corner, and the upper and the left side from it, in the unit of the axes.
+    `media`, {'png', 'jpeg', 'webp'}. `corner`, `across`, `down`, (2,): upper left corner, and the
+    upper and the left side from it, in the unit of the axes.
     """
 
     data: bytes
@@ -248,16 +230,9 @@ class Chart:
 
     Planes come first, above the panels that share the axis.
 
-    Attributes
-    ----------
-    slug : str
-        File name.
-    x_label : str
-        With its unit; in a chart of planes alone the axis of their `Line.stamps`.
-    log_x : bool
-        Whether the horizontal axis is logarithmic.
-    beside : bool
-        Whether the panels are side by side, each with its own horizontal axis.
+    `slug`: file name. `x_label`: with its unit; in a chart of planes alone the axis of their
+    `Line.stamps`. `log_x`: whether the horizontal axis is logarithmic. `beside`: whether the panels
+    are side by side, each with its own horizontal axis.
     """
 
     slug: str
@@ -323,12 +298,8 @@ def curve(
 ) -> Line:
     """Make a line thinned to the resolution of a screen, keeping every peak.
 
-    Parameters
-    ----------
-    x, y : array_like, (n,)
-        NaN in `y` breaks the curve.
-    buckets : int
-        Equal runs of samples, of each of which the minimum and maximum are kept.
+    `x`, `y`, (n,): NaN in `y` breaks the curve. `buckets`: equal runs of samples, of each of which
+    the minimum and maximum are kept.
     """
     xs, ys = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     rows = kept_rows((ys,), buckets)
@@ -360,15 +331,8 @@ def break_jumps(angle_deg: ArrayLike) -> Array:
 def kept_rows(columns: tuple[Array, ...], buckets: int = BUCKETS_OVER_TIME) -> NDArray[np.intp]:
     """Rows of the minimum and maximum of each column in each of equal runs.
 
-    Parameters
-    ----------
-    columns : tuple of ndarray, (n,)
-        NaN is skipped, except the first of each run of samples, which breaks a curve.
-
-    Returns
-    -------
-    ndarray of int
-        In order, including both ends; all rows if there are few.
+    `columns`, (n,): NaN is skipped, except the first of each run of samples, which breaks a curve.
+    Returns: in order, including both ends; all rows if there are few.
     """
     n = columns[0].size
     if n <= 2 * buckets:
@@ -409,17 +373,8 @@ def thin_fill(
 def broken(time: Array, *columns: Array, longest: float = 5.0) -> tuple[Array, ...]:
     """Insert a row of NaN in each gap, so that no curve bridges it.
 
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-    *columns : ndarray, (n,)
-    longest : float
-        Longest step without a gap, in usual steps.
-
-    Returns
-    -------
-    tuple of ndarray
-        Time and the columns.
+    `time`, (n,), s. `*columns`, (n,). `longest`: longest step without a gap, in usual steps.
+    Returns time and the columns.
     """
     if time.size < 3:
         return (time, *columns)

@@ -163,16 +163,9 @@ _SIDE, _RISE = 9.0, 13.0  # pixels of a label from its point
 class Frame:
     """A panel with its position in the picture and its axes.
 
-    Attributes
-    ----------
-    box : Box
-        Left, top, right, bottom of the area between the axes.
-    x, y : Scale
-        `y` from the bottom upward; for categories from the top downward.
-    x_named, y_named : bool
-        Whether the tick labels are written here.
-    group : str
-        Panels of one group share the horizontal axis.
+    `box`: left, top, right, bottom of the area between the axes. `x`, `y`: `y` from the bottom
+    upward; for categories from the top downward. `x_named`, `y_named`: whether the tick labels are
+    written here. `group`: panels of one group share the horizontal axis.
     """
 
     panel: Panel

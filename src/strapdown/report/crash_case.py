@@ -105,10 +105,7 @@ CRASH = ReportBundle("crash", _configuration, _run, _write, pdf=True)
 def file_name(name: str, made: set[str]) -> str:
     """Return a valid file name that differs from those already made.
 
-    Parameters
-    ----------
-    made : set of str
-        The new name is added.
+    `made`: the new name is added.
     """
     plain = "".join(c if c.isascii() and c.isalnum() else "-" for c in name.lower()).strip("-")
     plain = plain[:60] or "recorder"
@@ -519,10 +516,7 @@ UNITS = dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m_per_s") | dict.from
 def trajectory_table(path: CrashPath) -> pd.DataFrame:
     """Return the path with its standard deviations; column names carry units.
 
-    Returns
-    -------
-    DataFrame
-        By time in s: position, velocity, attitude, then their standard deviations.
+    Returns: by time in s: position, velocity, attitude, then their standard deviations.
     """
     values = path.table.rename(columns={c: f"{c}_{u}" for c, u in UNITS.items()})
     sd = path.sd.rename(columns={c: f"{c}_sd_{u}" for c, u in UNITS.items()})
@@ -532,12 +526,9 @@ def trajectory_table(path: CrashPath) -> pd.DataFrame:
 def signals_table(unit: UnitReconstruction) -> pd.DataFrame:
     """Return the signals of one recorder at the reference point, including gravity.
 
-    Returns
-    -------
-    DataFrame
-        Specific force forward, right, down in m/s² and rates in deg/s at the common stamps; for a
-        recorder of several ranges also the selected range (0 the lowest) and the samples at the end
-        of its range, by sensor axis.
+    Returns: specific force forward, right, down in m/s² and rates in deg/s at the common stamps;
+    for a recorder of several ranges also the selected range (0 the lowest) and the samples at the
+    end of its range, by sensor axis.
     """
     imu = unit.at_point.imu
     table = pd.DataFrame(index=imu.index)
@@ -561,20 +552,9 @@ def signal_record(
 ) -> CrashRecord:
     """Return the signals of all answers at the reference point.
 
-    Parameters
-    ----------
-    title : str
-        Of the case.
-    point : str
-        Name of the reference point.
-    rate_hz : float, Hz
-        Sample rate of the common stamps.
-
-    Returns
-    -------
-    CrashRecord
-        Specific force (including gravity) and rates of each recorder and of their mean, along
-        the vehicle's axes.
+    `title`: of the case. `point`: name of the reference point. `rate_hz`, Hz: sample rate of the
+    common stamps. Returns: specific force (including gravity) and rates of each recorder and of
+    their mean, along the vehicle's axes.
     """
     channels = []
     for unit in answers:

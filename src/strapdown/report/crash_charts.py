@@ -70,15 +70,8 @@ def answers_of(
 def delta_v_course(acceleration: Acceleration, zero: float, low: float, high: float) -> Array:
     """Change of velocity since an instant, before and after it.
 
-    Parameters
-    ----------
-    zero, low, high : float, s
-        `zero` is the origin of the change; `low` and `high` are clipped to the record.
-
-    Returns
-    -------
-    ndarray, (n, 5)
-        Time in s, forward, right, down and resultant in m/s.
+    `zero`, `low`, `high`, s: `zero` is the origin of the change; `low` and `high` are clipped to
+    the record. Returns: (n, 5), time in s, forward, right, down and resultant in m/s.
     """
     low, high = max(low, acceleration.begin), min(high, acceleration.end)
     parts = []
@@ -101,17 +94,8 @@ def delta_v_half_widths(
 ) -> Array:
     """95 % half widths of the change of velocity since the onset of a contact.
 
-    Parameters
-    ----------
-    onset : Edge
-    instants : ndarray, (n,), s
-        After the onset; taken as exact, as clock times.
-    gravity : float, m/s²
-
-    Returns
-    -------
-    ndarray, (n, 4), m/s
-        Forward, right, down, resultant.
+    `instants`, (n,), s: after the onset; taken as exact, as clock times. `gravity`, m/s². Returns:
+    (n, 4), m/s, forward, right, down, resultant.
     """
     of, acceleration = unit.at_point, unit.acceleration
     rest_sd = of.resting_force(gravity)[1]
@@ -138,20 +122,10 @@ def delta_v_chart(
 ) -> Chart | None:
     """Chart the change of velocity since the onset of the contact of an event.
 
-    Parameters
-    ----------
-    combined : UnitReconstruction or None
-        Mean of the units, whose event and bound are drawn; if None, those of the first unit.
-    event : int
-        Index into the events of the mean, from 0.
-    gravity : float, m/s²
-    stated : sequence of ReferenceAnswer
-        Changes of velocity stated by others, drawn with their 95 % bounds.
-
-    Returns
-    -------
-    Chart or None
-        None if the event does not exist.
+    `combined`: mean of the units, whose event and bound are drawn; if None, those of the first
+    unit. `event`: index into the events of the mean, from 0. `gravity`, m/s². `stated`: changes of
+    velocity stated by others, drawn with their 95 % bounds. Returns: None if the event does not
+    exist.
     """
     main = units[0] if combined is None else combined
     if not 0 <= event < len(main.events.events):
@@ -259,14 +233,8 @@ def sliding_chart(
 ) -> Chart | None:
     """Chart the change of velocity over a window that slides along the record, by every unit.
 
-    Parameters
-    ----------
-    window : float, s
-
-    Returns
-    -------
-    Chart or None
-        Each value at the end of its window; None where no record is as long as the window.
+    `window`, s. Returns: each value at the end of its window; None where no record is as long as
+    the window.
     """
     main = units[0] if combined is None else combined
     events = main.events.events
@@ -314,10 +282,7 @@ _REST = "others"
 def delta_v_budget(change: VelocityChange) -> pd.DataFrame:
     """Standard deviation that each contributor adds to a change of velocity.
 
-    Returns
-    -------
-    DataFrame
-        Indexed by contributor; ``forward right down``, m/s.
+    Returns: indexed by contributor; ``forward right down``, m/s.
     """
     found = change.bound.by_contributor[["xx", "yy", "zz"]]
     values = np.sqrt(np.maximum(found.to_numpy(dtype=np.float64), 0.0))
@@ -327,10 +292,7 @@ def delta_v_budget(change: VelocityChange) -> pd.DataFrame:
 def delta_v_budget_chart(change: VelocityChange) -> Chart:
     """Chart the error budget of a change of velocity, largest contributor first.
 
-    Parameters
-    ----------
-    change : VelocityChange
-        Along vehicle axes.
+    `change`: along vehicle axes.
     """
     table = delta_v_budget(change)[["forward", "right"]]
     return _chart(
@@ -347,10 +309,7 @@ def delta_v_budget_chart(change: VelocityChange) -> Chart:
 def place_budget_chart(path: CrashPath, names: tuple[str, str] = ("forward", "right")) -> Chart:
     """Chart the error budget of the end position, largest contributor first.
 
-    Parameters
-    ----------
-    names : (str, str)
-        Of the first two axes of the path.
+    `names`: of the first two axes of the path.
     """
     found = path.variances()[NED[:2]]
     table = pd.DataFrame(np.sqrt(found.to_numpy()), index=found.index, columns=list(names))
@@ -422,12 +381,7 @@ def pdof_charts(
 ) -> tuple[Chart, Chart]:
     """Chart the direction of force against the window length, and against an error of time zero.
 
-    Parameters
-    ----------
-    combined : UnitReconstruction or None
-        Mean of the units, whose event it is; if None, the first unit.
-    event : int
-        From 0.
+    `combined`: mean of the units, whose event it is; if None, the first unit. `event`: from 0.
     """
     main = units[0] if combined is None else combined
     whole = main.body[event].event.delta_v
@@ -530,15 +484,8 @@ _CLASS = 60
 def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart | None:
     """Chart the difference of each unit's change of velocity from that of all together.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of all units in the order of the report, for their colours.
-
-    Returns
-    -------
-    Chart or None
-        For axes that two or more units measure; None if there are none.
+    `names`: of all units in the order of the report, for their colours. Returns: for axes that two
+    or more units measure; None if there are none.
     """
     edges = 1e3 * comparison.edges
     panels = []
@@ -578,10 +525,7 @@ def accelerations_chart(
 ) -> Chart:
     """Chart the acceleration of the reference point from every unit.
 
-    Returns
-    -------
-    Chart
-        Low-pass filtered with CFC 60 where the common rate permits.
+    Low-pass filtered with CFC 60 where the common rate permits.
     """
     main = units[0] if combined is None else combined
     span = crash_span(events, main.acceleration.begin, main.acceleration.end)
@@ -628,19 +572,9 @@ def risk_chart(
 ) -> Chart | None:
     """Chart the injury-risk models that gave an answer, each within its range.
 
-    Parameters
-    ----------
-    delta_v, sd : float, m/s
-        Inputs of the models.
-    inputs : mapping, optional
-        Further inputs of the models.
-    at_least : bool
-        Whether the change of velocity has no upper bound; its bar then reaches to the model's end.
-
-    Returns
-    -------
-    Chart or None
-        None if no model uses a change of velocity or none gave an answer.
+    `delta_v`, `sd`, m/s: inputs of the models. `inputs`: further inputs of the models. `at_least`:
+    whether the change of velocity has no upper bound; its bar then reaches to the model's end.
+    Returns: None if no model uses a change of velocity or none gave an answer.
     """
     lines: list[Line] = []
     reach = TWO_SIDED_95 * sd

@@ -37,16 +37,10 @@ _ARROW = 0.28
 class Outline:
     """A vehicle from above in some plane.
 
-    Attributes
-    ----------
-    body : ndarray, (n, 2), m
-        Corners in order around the body, in vehicle axes forward and right, or as placed.
-    windows : tuple of ndarray, (k, 2), m
-        Filled shapes: the windscreen first, or an arrow towards the front of a stated outline.
-    folds : tuple of ndarray, (k, 2), m
-        Lines on the body.
-    stated : bool
-        Whether the outline is stated in the case, instead of a car of its length and width.
+    `body`, (n, 2), m: corners in order around the body, in vehicle axes forward and right, or as
+    placed. `windows`, (k, 2), m: filled shapes: the windscreen first, or an arrow towards the front
+    of a stated outline. `folds`, (k, 2), m: lines on the body. `stated`: whether the outline is
+    stated in the case, instead of a car of its length and width.
     """
 
     body: Array = field(repr=False)
@@ -67,14 +61,9 @@ class Outline:
     def placed(self, at: ArrayLike, heading_deg: float, point: ArrayLike = (0.0, 0.0)) -> Outline:
         """Turn and move the vehicle into a level plane.
 
-        Parameters
-        ----------
-        at : array_like, (2,), m
-            Position of `point`: north and east, or the axes of headings of zero and of 90 deg.
-        heading_deg : float, deg
-            Clockwise from above. Roll and pitch are not shown.
-        point : array_like, (2,), m
-            Of the vehicle, forward and right from its origin.
+        `at`, (2,), m: position of `point`: north and east, or the axes of headings of zero and of
+        90 deg. `heading_deg`, deg: clockwise from above. Roll and pitch are not shown. `point`,
+        (2,), m: of the vehicle, forward and right from its origin.
         """
         c, s = math.cos(math.radians(heading_deg)), math.sin(math.radians(heading_deg))
         turn = np.array([[c, s], [-s, c]])
@@ -97,11 +86,7 @@ class Outline:
     def edge(self, point: ArrayLike, direction_deg: float) -> float:
         """Distance from a point to the outline in a direction, m; zero if it does not intersect.
 
-        Parameters
-        ----------
-        point : array_like, (2,), m
-        direction_deg : float, deg
-            Clockwise from forward.
+        `point`, (2,), m. `direction_deg`, deg: clockwise from forward.
         """
         u = np.array([math.cos(math.radians(direction_deg)), math.sin(math.radians(direction_deg))])
         a = self.body - np.asarray(point, dtype=np.float64)[:2]
@@ -117,11 +102,8 @@ class Outline:
 def vehicle_outline(vehicle: VehicleSpec) -> Outline:
     """Outline of a vehicle from above, in vehicle axes from its origin.
 
-    Parameters
-    ----------
-    vehicle : VehicleSpec
-        ``outline_m`` as stated; else a car of ``length_m`` and ``width_m`` whose front is
-        ``front_m`` ahead of the origin, half its length where that is not given.
+    `vehicle`: ``outline_m`` as stated; else a car of ``length_m`` and ``width_m`` whose front is
+    ``front_m`` ahead of the origin, half its length where that is not given.
     """
     if len(vehicle.outline_m) >= 3:
         body = np.array(vehicle.outline_m, dtype=np.float64)
@@ -159,14 +141,8 @@ def draw_outline(
 ) -> None:
     """Draw a vehicle whose points are already in pixels.
 
-    Parameters
-    ----------
-    colour, width, dash
-        Style of its edge.
-    fill, opacity
-        Style of its body.
-    details : bool
-        Whether all windows and folds are drawn, or only the marking of the front.
+    `colour`, `width`, `dash`: style of its edge. `fill`, `opacity`: style of its body. `details`:
+    whether all windows and folds are drawn, or only the marking of the front.
     """
     drawing.shape(pixels.body, colour, width, dash, fill=fill, opacity=opacity)
     for k, window in enumerate(pixels.windows):
@@ -195,12 +171,8 @@ _DASHES = ("dash", "dashdot", "longdash", "dot")
 def unit_look(number: int | None, alone: bool = False) -> dict[str, str]:
     """Color, dash and symbol of a unit in every picture of a report.
 
-    Parameters
-    ----------
-    number : int or None
-        Index of the unit, from 0; None for the mean of the units.
-    alone : bool
-        Whether this is the only unit, drawn solid.
+    `number`: index of the unit, from 0; None for the mean of the units. `alone`: whether this is
+    the only unit, drawn solid.
     """
     if number is None:
         return {"colour": BLACK, "dash": "solid", "symbol": "circle"}
@@ -221,11 +193,8 @@ def crash_span(events: Sequence[CrashEvent], begin: float, end: float) -> tuple[
 def path_moments(path: CrashPath, events: Sequence[CrashEvent]) -> list[tuple[str, float]]:
     """Name the key instants of a path in time order; each is within the path.
 
-    Returns
-    -------
-    list of (str, float)
-        ``begin`` (of the window), ``entry``, ``time zero`` and ``563 event end`` of each event,
-        ``end``; names of instants at the same sample are joined by commas.
+    Returns: ``begin`` (of the window), ``entry``, ``time zero`` and ``563 event end`` of each
+    event, ``end``; names of instants at the same sample are joined by commas.
     """
     many = len(events) > 1
     begin, end = float(path.time[0]), float(path.time[-1])
@@ -262,19 +231,8 @@ def marks_apart(
 ) -> tuple[Mark, ...]:
     """Marks at instants, with labels that do not overlap.
 
-    Parameters
-    ----------
-    named : sequence of (float, str)
-        Instants in s; those outside are dropped.
-    begin, end : float, s
-        Ends of the drawn span.
-    scale : float
-        Of the axis: 1000 for ms.
-
-    Returns
-    -------
-    tuple of Mark
-        Of marks close to each other, the last carries all names.
+    `named`: instants in s; those outside are dropped. `begin`, `end`, s: ends of the drawn span.
+    `scale`: of the axis: 1000 for ms. Of marks close to each other, the last carries all names.
     """
     out: list[Mark] = []
     for at, name in sorted(named):

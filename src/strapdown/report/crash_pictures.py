@@ -37,22 +37,11 @@ _LEAST_WEDGE = 1.0
 class Direction:
     """Direction of force of one event.
 
-    Attributes
-    ----------
-    horizontal_deg : float, deg
-        Direction from which the force came, clockwise from the front.
-    interval : AngleInterval or None
-        The 95 % interval.
-    delta_v : float, m/s
-        Length of the change of velocity.
-    main : bool
-        Drawn with a strong line; the others thin.
-    number : int or None
-        Index of the unit whose answer it is, from 0; None for the main answer.
-    vertical_deg : float, deg
-        Positive from above.
-    vertical : AngleInterval or None
-        Its 95 % interval.
+    `horizontal_deg`, deg: direction from which the force came, clockwise from the front.
+    `interval`: the 95 % interval. `delta_v`, m/s: length of the change of velocity. `main`: drawn
+    with a strong line; the others thin. `number`: index of the unit whose answer it is, from 0;
+    None for the main answer. `vertical_deg`, deg: positive from above. `vertical`: its 95 %
+    interval.
     """
 
     name: str
@@ -77,24 +66,11 @@ def pdof_dial(
 ) -> Picture:
     """Draw directions of force about a vehicle, seen from above with its front upward.
 
-    Parameters
-    ----------
-    outline : Outline
-        In vehicle axes.
-    directions : sequence of Direction
-        One per event, in time order.
-    recorders : sequence of Direction
-        Of the main event by each recorder, marked by its number.
-    point : sequence of float, m
-        Reference point in vehicle axes, at the center of the dial.
-    small : bool
-        Draw the dial alone, for a page with the numbers beside it.
-
-    Returns
-    -------
-    Picture
-        An arrow from the origin of each force towards the point, its interval as a wedge; a shaded
-        ring if the direction is undetermined.
+    `outline`: in vehicle axes. `directions`: one per event, in time order. `recorders`: of the main
+    event by each recorder, marked by its number. `point`, m: reference point in vehicle axes, at
+    the center of the dial. `small`: draw the dial alone, for a page with the numbers beside it.
+    Returns: an arrow from the origin of each force towards the point, its interval as a wedge; a
+    shaded ring if the direction is undetermined.
     """
     rows = sorted(directions, key=lambda d: not d.main)
     height = 2.0 * _TOP + 26.0 + sum(64.0 if d.main else 33.0 for d in rows)
@@ -184,19 +160,9 @@ def elevation_dial(
 ) -> Picture:
     """Draw the vertical angle of a force in its own vertical plane.
 
-    Parameters
-    ----------
-    outline : Outline
-        In vehicle axes; drawn from the right for a force from the front or the rear, and from
-        behind for one from a side.
-    main : Direction
-    recorders : sequence of Direction
-        Of the same event, marked by their numbers.
-
-    Returns
-    -------
-    Picture
-        The angle above the horizontal, with its 95 % interval as a wedge.
+    `outline`: in vehicle axes; drawn from the right for a force from the front or the rear, and
+    from behind for one from a side. `recorders`: of the same event, marked by their numbers.
+    Returns: the angle above the horizontal, with its 95 % interval as a wedge.
     """
     angle = math.remainder(main.horizontal_deg, 360.0)
     aside = 45.0 < abs(angle) < 135.0
@@ -281,14 +247,8 @@ def _elevation_words(d: Direction) -> str:
 class PointChange:
     """Change of velocity at a measuring point.
 
-    Attributes
-    ----------
-    unit : MountingPoint
-    delta_v : sequence of float, (3,), m/s
-        At the point itself, along the axes of the vehicle.
-    covariance : ndarray, (3, 3)
-    at_least : bool
-        The record holds a part only.
+    `delta_v`, (3,), m/s: at the point itself, along the axes of the vehicle. `covariance`, (3, 3).
+    `at_least`: the record holds a part only.
     """
 
     unit: MountingPoint
@@ -304,16 +264,8 @@ _POINTS_CAR, _POINTS_ARROW = 210.0, 96.0
 def points_picture(outline: Outline, changes: Sequence[PointChange]) -> Picture:
     """Draw the measuring points on the vehicle, each with its change of velocity as an arrow.
 
-    Parameters
-    ----------
-    outline : Outline
-        In vehicle axes, drawn with its front upward.
-    changes : sequence of PointChange
-
-    Returns
-    -------
-    Picture
-        Arrows at one scale, with the 95 % ellipse of each at its tip; numbers below.
+    `outline`: in vehicle axes, drawn with its front upward. Returns: arrows at one scale, with the
+    95 % ellipse of each at its tip; numbers below.
     """
     low, high = outline.low, outline.high
     scale = _POINTS_CAR / float(max(high - low))
@@ -331,17 +283,7 @@ def points_picture(outline: Outline, changes: Sequence[PointChange]) -> Picture:
     alt = "Change of velocity at the measuring points: "
     alt += "; ".join(f"{name}: {words}" for name, words in told)
     out = Drawing(_WIDTH, top + bottom + _KEY_ROW * len(changes) + 28.0, alt)
-
-    def above(p: Sequence[float]) -> tuple[float, float]:
-        return (
-            centre[0] + scale * (p[1] - float(middle[1])),
-            centre[1] - scale * (p[0] - float(middle[0])),
-        )
-
-    def pixels(points: np.ndarray) -> np.ndarray:
-        return np.array([above(p) for p in points.tolist()], dtype=np.float64)
-
-    draw_outline(out, outline.mapped(pixels), _BODY, 1.4, fill="#eef1f5", opacity=1.0)
+    above = _from_above(out, outline, centre, scale)
     for one in changes:
         x, y = above(one.unit.position)
         tip = (x + per * one.delta_v[1], y - per * one.delta_v[0])
@@ -487,12 +429,8 @@ _EXAMPLE = 40.0  # deg, of the example force that shows the sign of the angle
 class MountingPoint:
     """Mounting position of a unit.
 
-    Attributes
-    ----------
-    position : sequence of float, (3,), m
-        Vehicle axes, from the vehicle's origin.
-    number : int
-        Index of the unit, from 0; sets its color.
+    `position`, (3,), m: vehicle axes, from the vehicle's origin. `number`: index of the unit, from
+    0; sets its color.
     """
 
     name: str
@@ -509,17 +447,9 @@ def conventions_picture(
 ) -> Picture:
     """Draw the sign conventions of axes, roll, pitch, heading and direction of force.
 
-    Parameters
-    ----------
-    outline : Outline
-        In vehicle axes.
-    point : sequence of float, (3,), m
-        Reference point, in vehicle axes from the vehicle's origin.
-
-    Returns
-    -------
-    Picture
-        The vehicle from above, from its right side and from behind, at one scale.
+    `outline`: in vehicle axes. `point`, (3,), m: reference point, in vehicle axes from the
+    vehicle's origin. Returns: the vehicle from above, from its right side and from behind, at one
+    scale.
     """
     where = ", ".join(f"{u.name} at {_place(u.position)}" for u in units)
     alt = (
@@ -533,19 +463,14 @@ def conventions_picture(
     scale = min(_LONG / length, _ACROSS / width)
     middle = 0.5 * (low + high)
 
-    def above(p: Sequence[float]) -> tuple[float, float]:
-        return (
-            _TOP_VIEW[0] + scale * (p[1] - float(middle[1])),
-            _TOP_VIEW[1] - scale * (p[0] - float(middle[0])),
-        )
-
     def side(p: Sequence[float]) -> tuple[float, float]:
         return _SIDE_VIEW[0] + scale * (p[0] - float(middle[0])), _SIDE_VIEW[1] + scale * p[2]
 
     def behind(p: Sequence[float]) -> tuple[float, float]:
         return _REAR_VIEW[0] + scale * (p[1] - float(middle[1])), _REAR_VIEW[1] + scale * p[2]
 
-    _draw_above(out, outline, above, point)
+    above = _from_above(out, outline, _TOP_VIEW, scale)
+    _draw_clock(out, above(point))
     draw_side(out, outline, side, scale)
     draw_behind(out, outline, behind)
     for words, x, y in (
@@ -574,11 +499,25 @@ def _place(position: Sequence[float]) -> str:
     return "(" + ", ".join(values).replace("-", "−") + f") {length_unit()}"
 
 
-def _draw_above(out: Drawing, outline: Outline, view: Project, point: Sequence[float]) -> None:
+def _from_above(out: Drawing, outline: Outline, centre: Point, scale: float) -> Project:
+    """Draw a vehicle from above, its front upward, in pixels per m; return where positions are."""
+    middle = 0.5 * (outline.low + outline.high)
+
+    def above(p: Sequence[float]) -> tuple[float, float]:
+        return (
+            centre[0] + scale * (p[1] - float(middle[1])),
+            centre[1] - scale * (p[0] - float(middle[0])),
+        )
+
     def pixels(points: np.ndarray) -> np.ndarray:
-        return np.array([view(p) for p in points.tolist()], dtype=np.float64)
+        return np.array([above(p) for p in points.tolist()], dtype=np.float64)
 
     draw_outline(out, outline.mapped(pixels), _BODY, 1.4, fill="#eef1f5", opacity=1.0)
+    return above
+
+
+def _draw_clock(out: Drawing, target: Point) -> None:
+    """Draw the clock of the direction of force, with an example that pushes at a point."""
     centre = _TOP_VIEW
     out.circle(centre, _CLOCK, "#c3cad2", 1.0)
     for hour in range(1, 13):
@@ -586,7 +525,6 @@ def _draw_above(out: Drawing, outline: Outline, view: Project, point: Sequence[f
         out.line(*ends, _SOFT, 1.0)
         at = _at(centre, _CLOCK + 11.0, 30.0 * hour)
         out.text(at, str(hour), 10.5, INK, anchor="middle", bold=hour % 3 == 0)
-    target = view(point)
     reach = _CLOCK - 9.0
     tail = _at(centre, reach, _EXAMPLE)
     away = math.hypot(tail[0] - target[0], tail[1] - target[1])

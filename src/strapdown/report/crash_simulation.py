@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+import textwrap
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -112,16 +113,29 @@ def _formats(spec: CrashSimulationSpec) -> tuple[str, ...]:
     return tuple(RECORD_WRITERS) if "all" in spec.formats else tuple(dict.fromkeys(spec.formats))
 
 
-def _parts(of: RecordedUnit) -> list[tuple[int | None, RecordedTriad]]:
-    """Accelerometers by their numbers, and the gyro (None)."""
-    parts: list[tuple[int | None, RecordedTriad]] = list(enumerate(of.unit.accelerometers))
-    return parts if of.unit.gyro is None else [*parts, (None, of.unit.gyro)]
+class _Part(NamedTuple):
+    """A triad of a recorder: its number (None: the gyro), how it was built, read and is wrong."""
+
+    which: int | None
+    design: TriadDesign
+    triad: RecordedTriad
+    errors: TriadErrors
+
+
+def _parts(of: RecordedUnit) -> list[_Part]:
+    """The accelerometers of a recorder, and its gyro."""
+    unit, design, truth = of.unit, of.recorder.design, of.truth
+    each = zip(design.accelerometers, unit.accelerometers, truth.accelerometers, strict=True)
+    parts = [_Part(k, *one) for k, one in enumerate(each)]
+    if unit.gyro is not None and design.gyro is not None and truth.gyro is not None:
+        parts.append(_Part(None, design.gyro, unit.gyro, truth.gyro))
+    return parts
 
 
 def _write_csv(folder: Path, of: RecordedUnit) -> dict[str, PartPlace]:
     """Write one text table per part, as exported by a recorder."""
     places = {}
-    for which, triad in _parts(of):
+    for which, _, triad, _ in _parts(of):
         name = part_file(of, which)
         write_recorder_csv(folder / f"{name}.csv", triad.table)
         headings = GYRO_HEADINGS if which is None else ACCEL_HEADINGS
@@ -132,7 +146,7 @@ def _write_csv(folder: Path, of: RecordedUnit) -> dict[str, PartPlace]:
 def _write_mme(folder: Path, of: RecordedUnit) -> dict[str, PartPlace]:
     """Write one test in ISO MME for all parts, as delivered by a laboratory."""
     name = of.unit.name.lower()
-    channels = {part_file(of, which): _channels(of, which, triad) for which, triad in _parts(of)}
+    channels = {part_file(of, p.which): _channels(of, p.which, p.triad) for p in _parts(of)}
     record = CrashRecord(
         Path(name),
         "simulated",
@@ -255,23 +269,15 @@ def _end(recorded: RecordedCase) -> dict[str, float]:
 
 
 def _unit(of: RecordedUnit) -> dict[str, Any]:
-    truth, unit, design = of.truth, of.unit, of.recorder.design
+    truth, unit = of.truth, of.unit
     parts = {
-        f"{part_file(of, k)}.csv": {
+        f"{part_file(of, which)}.csv": {
             "part": built.part,
             "rate_hz": built.rate,
-            "errors": stated_errors(errors, "m_per_s2"),
+            "errors": stated_errors(errors, "rad_per_s" if which is None else "m_per_s2"),
         }
-        for k, (built, errors) in enumerate(
-            zip(design.accelerometers, truth.accelerometers, strict=True)
-        )
+        for which, built, _, errors in _parts(of)
     }
-    if truth.gyro is not None and design.gyro is not None:
-        parts[f"{part_file(of, None)}.csv"] = {
-            "part": design.gyro.part,
-            "rate_hz": design.gyro.rate,
-            "errors": stated_errors(truth.gyro, "rad_per_s"),
-        }
     return {
         "mounting": _mounting(truth.mounting),
         "stated_mounting": _mounting(unit.mounting),
@@ -318,88 +324,6 @@ _DIGITS = 7
 _COMMON_RATE = 200.0  # Hz
 # Column of the comments.
 _COLUMN = 34
-_HEAD = """\
-# {summary}.
-# Simulated: recorders that wrote records, with the statements of an investigator.
-# Facts that no record contains, known only to you in a real crash, are marked "yours".
-# scenario.json and truth.csv hold what really happened.
-#{remark}
-# Run: strapdown crash case.toml
-#
-# Axes of the vehicle: forward, right, down. Lengths in m from one origin, here the center of mass.
-# Each key ends in its unit. Every ..._sd is a standard deviation: two of three cases lie within it.
-
-title = {title}
-number = {number}
-author = ""  # yours
-description = {description}
-
-[vehicle]  # yours: for drawings, and for models of severity
-name = "simulated car"
-mass_kg = 1300.0  # nothing here depends on it
-length_m = 4.2
-width_m = 1.7
-front_m = 2.0  # from the origin forward to the bumper
-
-[point]  # the point whose motion is reconstructed
-name = "center of mass"
-position_m = [0.0, 0.0, 0.0]
-"""
-_SPEED = """
-[entry]  # yours: how the vehicle came to the crash
-kind = "speed"  # speed, standstill or gnss
-source = "simulated light gate"
-speed_m_per_s = {speed}  # {kmh} km/h
-speed_sd_m_per_s = {speed_sd}
-time_s = 0.0  # when it was measured, from the trigger
-heading_deg = {heading}  # of the vehicle then; with 0, "north" is forward and "east" right
-slip_deg = {slip}  # direction of travel less heading
-slip_sd_deg = 0.5
-"""
-_STANDSTILL = """
-[entry]  # yours: how the vehicle came to what happened
-kind = "standstill"  # speed, standstill or gnss
-source = "simulated: it was parked"
-"""
-_UNIT = """
-[[units]]
-name = "{name}"
-position_m = {position}  # yours: forward, right, down, with a tape measure
-position_sd_m = {position_sd}
-angles_deg = {angles}  # yours: roll, pitch, heading of the recorder against the vehicle
-angles_sd_deg = {angles_sd}
-trigger_s = {trigger}  # yours: the common trigger on this recorder's clock
-trigger_sd_s = {trigger_sd}
-"""
-_ASSUMED = """
-[units.assumed]  # yours: there is no gyro
-turn_sd_deg = {turn}  # by how much the vehicle may have turned, each axis
-over_s = [0.0, 0.15]
-because = {because}
-"""
-_REFERENCES = """
-[[references]]  # what the path is held beside; leave it out where there is none
-kind = "path"
-name = "cameras"
-source = "two simulated cameras, 1000 frames/s, calibrated"
-path = "cameras.csv"
-
-# In a simulation the truth is known, too. Take the # away to see the answers beside it.
-# [[references]]
-# kind = "path"
-# name = "truth"
-# source = "simulation"
-# path = "truth.csv"
-"""
-_OPTIONS = """
-[options]
-rate_hz = {rate}  # of the common stamps
-sampling = "{sampling}"
-gravity_m_per_s2 = {gravity}  # yours: at the place
-clock = "trigger"  # trigger, or correlation of what the recorders felt
-monte_carlo_runs = 2000
-seed = 0
-"""
 
 
 @dataclass(frozen=True)
@@ -414,52 +338,34 @@ class PartPlace:
 def case_text(recorded: RecordedCase, places: Mapping[str, PartPlace], seed: int) -> str:
     """Write the case file of a simulated crash.
 
-    Parameters
-    ----------
-    places : mapping of str to PartPlace
-        By `part_file`.
-    seed : int
-        Seed of the simulation, for the file's number.
-
-    Returns
-    -------
-    str
-        TOML with the stated properties of the recorders, not their true errors.
+    `places`: by `part_file`. `seed`: seed of the simulation, for the file's number. Returns: TOML
+    with the stated properties of the recorders, not their true errors.
     """
-    case, entry = recorded.case, recorded.entry
-    summary = case.summary[0].upper() + case.summary[1:]
-    remark = "".join(f"\n# {line}" for line in _wrapped(case.remark)) + "\n#" if case.remark else ""
-    pieces = [
-        _HEAD.format(
-            summary=summary,
-            remark=remark,
-            title=_text(summary),
-            number=_text(f"simulated {case.name}, seed {seed}"),
-            description=_text(case.remark or "A simulated crash with known truth."),
-        )
-    ]
-    if entry.speed == 0.0:
-        pieces.append(_STANDSTILL)
-    else:
-        pieces.append(
-            _SPEED.format(
-                speed=_number(entry.told_speed),
-                kmh=f"{3.6 * entry.told_speed:.1f}",
-                speed_sd=_number(entry.speed_sd),
-                heading=_number(round(entry.heading_deg, 6)),
-                slip=_number(round(entry.slip_deg, 6)),
-            )
-        )
-    pieces += [_unit_text(unit, places) for unit in recorded.units]
-    pieces.append(_REFERENCES)
-    pieces.append(
-        _OPTIONS.format(
-            sampling=_sampling(recorded),
-            rate=_number(_rate(recorded)),
-            gravity=_number(_gravity(recorded), 5),
-        )
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("strapdown.report", ""),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
-    return _aligned("".join(pieces))
+    case = recorded.case
+    text = environment.get_template("simulated_case.toml.jinja").render(
+        case=case,
+        entry=recorded.entry,
+        summary=case.summary[0].upper() + case.summary[1:],
+        remark=textwrap.wrap(case.remark, 94),
+        seed=seed,
+        units=recorded.units,
+        parts=lambda of: _statements(of, places),
+        sampling=recorded.units[0].unit.accelerometers[0].table.attrs["sampling"],
+        rate=_rate(recorded),
+        gravity=_gravity(recorded),
+        number=_number,
+        numbers=_numbers,
+        text=lambda text: json.dumps(text, ensure_ascii=False),
+    )
+    return _aligned(text)
 
 
 def part_name(unit: RecordedUnit, which: int | None) -> str:
@@ -476,57 +382,21 @@ def part_file(unit: RecordedUnit, which: int | None) -> str:
     return f"{unit.unit.name}_{part_name(unit, which)}".lower().replace("-", "_")
 
 
-def _unit_text(of: RecordedUnit, places: Mapping[str, PartPlace]) -> str:
-    unit, design = of.unit, of.recorder.design
-    assert unit.trigger is not None
-    text = _UNIT.format(
-        name=unit.name,
-        position=_numbers(unit.mounting.position),
-        position_sd=_number(unit.mounting.position_sd),
-        angles=_numbers(unit.mounting.angles_deg),
-        angles_sd=_number(unit.mounting.angles_sd_deg),
-        trigger=_number(round(unit.trigger, 6)),
-        trigger_sd=_number(unit.trigger_sd, 3),
-    )
-    if unit.gyro_from is not None:
-        text += f'gyro_from = "{unit.gyro_from}"  # it has none of its own\n'
-    for k, (triad, built) in enumerate(
-        zip(unit.accelerometers, design.accelerometers, strict=True)
-    ):
-        comment = "  # the lowest range first" if k == 0 else ""
-        text += f"\n[[units.accelerometers]]{comment}\n" + _triad_text(of, triad, built, k, places)
-    if unit.gyro is not None and design.gyro is not None:
-        text += "\n[units.gyro]\n" + _triad_text(of, unit.gyro, design.gyro, None, places)
-    if of.recorder.assumed_turn_sd_deg is not None:
-        text += _ASSUMED.format(
-            turn=_number(of.recorder.assumed_turn_sd_deg), because=_text(of.recorder.because)
-        )
-    return text
-
-
-def _triad_text(
-    of: RecordedUnit,
-    triad: RecordedTriad,
-    built: TriadDesign,
-    which: int | None,
-    places: Mapping[str, PartPlace],
-) -> str:
-    place = places[part_file(of, which)]
-    channels = ", ".join(f'{a} = "{name}"' for a, name in zip("xyz", place.channels, strict=True))
-    lines = [
-        f'name = "{part_name(of, which)}"',
-        f'path = "{place.path}"',
-        f"channels = {{ {channels} }}",
-        *([f'time = "{place.time}"'] if place.time else []),
-        f'sampling = "{triad.table.attrs["sampling"]}"',
-        f'sensor = "{built.part}"',
-    ]
-    kind = "gyro" if which is None else "accel"
-    stated = _differences(kind, built.part, triad.uncertainty)
-    if stated:
-        lines.append("# Instead of the data sheet's:")
-        lines.append(f"uncertainty = {{ {', '.join(stated)} }}")
-    return "\n".join(lines) + "\n"
+def _statements(of: RecordedUnit, places: Mapping[str, PartPlace]) -> Iterator[dict[str, Any]]:
+    """What the case says of each part of a recorder."""
+    for which, built, triad, _ in _parts(of):
+        table = "[units.gyro]" if which is None else "[[units.accelerometers]]"
+        place = places[part_file(of, which)]
+        kind = "gyro" if which is None else "accel"
+        yield {
+            "table": table + "  # the lowest range first" * (which == 0),
+            "name": part_name(of, which),
+            "place": place,
+            "channels": zip("xyz", place.channels, strict=True),
+            "sampling": triad.table.attrs["sampling"],
+            "sensor": built.part,
+            "stated": _differences(kind, built.part, triad.uncertainty),
+        }
 
 
 def _differences(kind: str, sensor: str, told: TriadUncertainty) -> list[str]:
@@ -544,10 +414,6 @@ def _differences(kind: str, sensor: str, told: TriadUncertainty) -> list[str]:
         value = _number(values[0], _DIGITS) if alike else _numbers(values, _DIGITS)
         found.append(f"{key} = {value}")
     return found
-
-
-def _sampling(recorded: RecordedCase) -> str:
-    return str(recorded.units[0].unit.accelerometers[0].table.attrs["sampling"])
 
 
 def _gravity(recorded: RecordedCase) -> float:
@@ -571,10 +437,6 @@ def _numbers(values: Sequence[float], digits: int = 12) -> str:
     return f"[{', '.join(_number(v, digits) for v in values)}]"
 
 
-def _text(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
-
-
 def _aligned(text: str) -> str:
     """Align the comments behind values in one column, where the values leave room."""
     lines = []
@@ -582,12 +444,6 @@ def _aligned(text: str) -> str:
         value, mark, comment = line.partition("  # ")
         lines.append(f"{value:<{_COLUMN}}{mark.lstrip()}{comment}" if mark else line)
     return "\n".join(lines) + "\n"
-
-
-def _wrapped(text: str) -> list[str]:
-    import textwrap
-
-    return textwrap.wrap(text, 94)
 
 
 # Stated errors of a sensor, with keys that carry their units.

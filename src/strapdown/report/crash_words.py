@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cache
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -47,7 +50,7 @@ from strapdown.sensors.pre_crash import PreparedUnit
 from strapdown.tables import NED, VELOCITY
 
 if TYPE_CHECKING:
-    from strapdown.crash.closure import Closure
+    from strapdown.crash.closure import Closure, Figure
     from strapdown.report.document import KeyFigure
 
 TYPES = {
@@ -287,14 +290,16 @@ def closure_words(result: CaseResult) -> str:
     told = "closes" if closure.freedom else "could not be tested"
     parts = [f"With {other} momentum {told}"]
     if closure.closing_speed is not None:
-        figure, per = closure.closing_speed, speed_factor()
-        value, low, high = (plain(per * x, 1) for x in (figure.value, figure.low, figure.high))
-        parts.append(f"the closing speed was {value} {speed_unit()} ({low} to {high})")
+        speeds = _figure(closure.closing_speed, speed_factor(), 1, f" {speed_unit()}")
+        parts.append(f"the closing speed was {speeds}")
     if closure.restitution is not None:
-        figure = closure.restitution
-        value, low, high = (plain(x, 2) for x in (figure.value, figure.low, figure.high))
-        parts.append(f"the restitution {value} ({low} to {high})")
+        parts.append(f"the restitution {_figure(closure.restitution)}")
     return "; ".join(parts) + "."
+
+
+def _figure(figure: Figure, factor: float = 1.0, places: int = 2, unit: str = "") -> str:
+    value, low, high = (plain(factor * x, places) for x in (figure.value, figure.low, figure.high))
+    return f"{value}{unit} ({low} to {high})"
 
 
 def references_words(result: CaseResult) -> Iterator[str]:
@@ -349,9 +354,7 @@ def _barrier_words(result: CaseResult, closure: Closure) -> str:
         depth = length_about(crush.depth.value, crush.depth.half_width)
         parts.append(f"it was crushed by {at_least}{depth}")
     if closure.restitution is not None:
-        figure = closure.restitution
-        value, low, high = (plain(x, 2) for x in (figure.value, figure.low, figure.high))
-        parts.append(f"the restitution was {value} ({low} to {high})")
+        parts.append(f"the restitution was {_figure(closure.restitution)}")
     return f"Against the barrier {'; '.join(parts)}." if parts else ""
 
 
@@ -427,10 +430,7 @@ def apart_headline(result: CaseResult) -> str:
 def apart_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     """Return delta-V and direction of force for page one: the span of all bounds.
 
-    Parameters
-    ----------
-    result : CaseResult
-        Of recorders that disagree.
+    `result`: of recorders that disagree.
     """
     from strapdown.report.document import KeyFigure
 
@@ -510,17 +510,8 @@ def notes(
 ) -> tuple[tuple[str, str], ...]:
     """Return findings as items; files and recorders with the same finding share an item.
 
-    Parameters
-    ----------
-    result : CaseResult
-        Supplies the name of the recorders' mean.
-    remedies : bool
-        Whether each item includes its remedy.
-
-    Returns
-    -------
-    tuple of (str, str)
-        Location, and finding with its remedy.
+    `result`: supplies the name of the recorders' mean. `remedies`: whether each item includes its
+    remedy. Returns: location, and finding with its remedy.
     """
     combined = result.reconstruction.combined
     told: dict[tuple[str, str], list[str]] = {}
@@ -587,10 +578,7 @@ def _sentence(text: str) -> str:
 def record_facts(record: CrashRecord) -> tuple[tuple[str, str], ...]:
     """Return the test metadata of a record, with units.
 
-    Returns
-    -------
-    tuple of (str, str)
-        Empty if the record has only its file name.
+    Returns: empty if the record has only its file name.
     """
     rows = []
     if record.title and record.title != record.path.stem:
@@ -654,10 +642,7 @@ AGAINST = frozenset(
 def contradictions(result: CaseResult) -> tuple[tuple[str, str], ...]:
     """Return what speaks against the answers: references, records and the other vehicle.
 
-    Returns
-    -------
-    tuple of (str, str)
-        Source, and what it says.
+    Returns: source, and what it says.
     """
     rows = []
     for answer in result.references:
@@ -689,78 +674,27 @@ def not_shown(result: CaseResult) -> tuple[tuple[str, str], ...]:
     """Return what the records of this case cannot show."""
     spec, made = result.spec, result.reconstruction
     unit = made.main
-    begin, end = unit.acceleration.begin, unit.acceleration.end
-    assumed_axes = list(dict.fromkeys(a for u in made.units for a in u.at_point.assumed_axes))
+    axes = list(dict.fromkeys(a for u in made.units for a in u.at_point.assumed_axes))
     barrier = spec.vehicle.against == "barrier"
     several, rate = len(made.units) > 1, spec.options.rate_hz
-    rows = (
-        (
-            True,
-            "Before and after the records",
-            f"They cover {instant(begin)} to {instant(end)} from the trigger; what the vehicle did "
-            "before and after is in no answer and in no bound.",
-        ),
-        (
-            True,
-            "The cause",
-            "Who steered, braked or gave way, visibility, the road and its grip are not in an "
-            "acceleration.",
-        ),
-        (
-            True,
-            "The people",
-            "Indices are those of dummies or of a model occupant, and a probability of injury is "
-            "that of many crashes of this severity: neither says how this person was injured.",
-        ),
-        (
-            True,
-            "Deformation that all recorders share",
-            "A recorder has the motion of its mounting. Where all mountings were pushed in with "
-            "the structure, their agreement does not show it.",
-        ),
-        (
-            spec.entry.kind == "speed",
-            "The speed before the impact",
-            "It is stated, not measured by these records; delta-V is the change alone.",
-        ),
-        (
-            not over_ground(result),
-            "The place on the road",
-            "Without a stated heading the path is relative to the vehicle at the entry; where on "
-            "the road it lies is not known.",
-        ),
-        (
-            not result.partners,
-            "The other vehicle or obstacle",
-            "Its mass, speed, stiffness and change of velocity are not known from these "
-            f"records{'' if barrier else '; a closing speed needs its case as well'}.",
-        ),
-        (
-            bool(assumed_axes),
-            "Axes that were not measured",
-            f"{', '.join(assumed_axes)}: an impact or a turn along them appears only as the bound "
-            "that was assumed.",
-        ),
-        (
-            not several,
-            "An error of the one recorder",
-            "A wrong sign, axis, scale factor or clock, or a loose bracket, looks like another "
-            "crash.",
-        ),
-        (
-            several,
-            "Errors that the recorders share",
-            "The same wrong angle, lever arm or trigger in every recorder moves all answers "
-            "together, and their comparison does not see it.",
-        ),
-        (
-            True,
-            "Fast motion",
-            f"Answers are at {rate:g} Hz: motion above {rate / 2.0:g} Hz, such as ringing of the "
-            "structure, is in their sum and not in their shape.",
-        ),
-    )
-    return tuple((head, text) for applies, head, text in rows if applies)
+    applies = {
+        "The speed before the impact": spec.entry.kind == "speed",
+        "The place on the road": not over_ground(result),
+        "The other vehicle or obstacle": not result.partners,
+        "Axes that were not measured": bool(axes),
+        "An error of the one recorder": not several,
+        "Errors that the recorders share": several,
+    }
+    values = {
+        "begin": instant(unit.acceleration.begin),
+        "end": instant(unit.acceleration.end),
+        "more": "" if barrier else "; a closing speed needs its case as well",
+        "axes": ", ".join(axes),
+        "rate": rate,
+        "half": rate / 2.0,
+    }
+    rows = sentences()["not_shown"].items()
+    return tuple((head, text.format(**values)) for head, text in rows if applies.get(head, True))
 
 
 # Limitations of the answers of a case, from its own events, most serious first.
@@ -788,57 +722,36 @@ def limitations(result: CaseResult) -> tuple[tuple[str, str, str], ...]:
     return tuple(_limitations(result))
 
 
+def _limitation(code: str, /, *, of: str | None = None, **values: str) -> tuple[str, str, str]:
+    """Code, head and text of a limitation; `of`: key of its sentences, by default the code."""
+    head, text = sentences()["limitations"][of or code]
+    return code, head.format(**values), text.format(**values)
+
+
 def _limitations(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     yield from _event(result)
     yield from clipping(result)
     yield from _disagreement(result)
     for answer in result.references:
         if answer.unit == result.reconstruction.main.name and not answer.consistent:
-            source = (
-                f" Source of the reference: {answer.spec.source}." if answer.spec.source else ""
-            )
-            yield (
-                "reference-contradicts",
-                f"Inconsistent with the reference {answer.spec.name}",
-                f"The difference exceeds the 95 % bound of both; see Reference comparison.{source}",
-            )
+            source = answer.spec.source and f" Source of the reference: {answer.spec.source}."
+            yield _limitation("reference-contradicts", name=answer.spec.name, source=source)
     closure = result.closure
     if closure is not None and closure.contradicted:
-        yield (
-            "vehicles-do-not-close",
-            f"{' and '.join((*result.vehicle_names, 'the barrier')[:2])} do not close",
-            "Momentum, closing speed or restitution of the two vehicles contradict each other "
-            "beyond their bounds: a record, a mass, a heading or an entry speed is wrong. See "
-            "Closure with the other vehicle."
-            if result.partners
-            else "Closing speed or restitution is not that of a rigid barrier that stands still: "
-            "what it met, the entry speed or a record is wrong. See Contact and deformation.",
-        )
+        first, second = (*result.vehicle_names, "the barrier")[:2]
+        of = None if result.partners else "barrier-does-not-close"
+        yield _limitation("vehicles-do-not-close", of=of, first=first, second=second)
     yield from assumed(result)
     yield from rest(result)
     yield from borrowed(result)
     if len(result.units) == 1:
-        yield (
-            "one-recorder",
-            "Only one recorder",
-            "An error that is not stated, such as an axis with a wrong sign, a wrong mounting "
-            "position or a loose bracket, cannot be detected.",
-        )
+        yield _limitation("one-recorder")
     yield from ringing(result)
     yield from _levers(result)
     if result.spec.entry.kind == "speed":
-        yield (
-            "entry-speed-stated",
-            "The entry speed is not from these records",
-            "It shifts all velocities and the path; delta-V and direction of force do not depend "
-            "on it.",
-        )
+        yield _limitation("entry-speed-stated")
     if not result.references:
-        yield (
-            "no-reference",
-            "No reference",
-            "No film, survey or other measurement of the crash was given.",
-        )
+        yield _limitation("no-reference")
 
 
 def _event(result: CaseResult) -> Iterator[tuple[str, str, str]]:
@@ -849,52 +762,23 @@ def _event(result: CaseResult) -> Iterator[tuple[str, str, str]]:
         alone = (
             f" {' and '.join(others)} alone recorded one: see Delta-V, and check whether another "
             "record begins late or ends early."
-        )
-        if unit.events.cut_change > 0.0:
-            yield (
-                "blow-beyond-record",
-                "The record ends within an impact",
-                f"It ends at {instant(unit.acceleration.end)}, while the velocity changes by more "
-                "than what ends an event by 49 CFR 563, and before it is one. Delta-V is at least "
-                f"{speed_words(unit.events.cut_change)}; severity and direction of force are not "
-                f"given.{alone if others else ''}",
-            )
-            return
-        yield (
-            "no-event",
-            "No event",
-            "The record has no event by 49 CFR 563. Delta-V and direction of force are not "
-            f"defined; the path is reported.{alone if others else ''}",
-        )
+        ) * bool(others)
+        cut = unit.events.cut_change
+        if cut > 0.0:
+            end = instant(unit.acceleration.end)
+            yield _limitation("blow-beyond-record", end=end, least=speed_words(cut), alone=alone)
+        else:
+            yield _limitation("no-event", alone=alone)
         return
     whole = unit.body[number].event
     if "after" in whole.missing:
-        yield (
-            "event-beyond-record",
-            "The contact continues beyond the record",
-            f"The record ends at {instant(whole.delta_v.end)} while the velocity still changes by "
-            "more than the bound: delta-V is at least that up to there, and the direction of force "
-            "that of the recorded part.",
-        )
+        yield _limitation("event-beyond-record", end=instant(whole.delta_v.end))
     if "before" in whole.missing:
-        yield (
-            "event-before-record",
-            "The contact begins before the record",
-            f"The record begins at {instant(whole.delta_v.start)}, within the contact: the change "
-            "before is missing, and delta-V is at least what follows.",
-        )
+        yield _limitation("event-before-record", start=instant(whole.delta_v.start))
     if whole.interval.horizontal.undetermined:
-        yield (
-            "direction-undetermined",
-            "The direction of force is not determined",
-            "The bound of the horizontal delta-V contains zero, so no direction is excluded.",
-        )
+        yield _limitation("direction-undetermined")
     if unit.ned[number] is None:
-        yield (
-            "event-outside-path",
-            "The event is not within the path",
-            "Its change of velocity is given along the rotating axes of the vehicle only.",
-        )
+        yield _limitation("event-outside-path")
 
 
 def _disagreement(result: CaseResult) -> Iterator[tuple[str, str, str]]:
@@ -902,23 +786,14 @@ def _disagreement(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     comparison = made.comparison
     if comparison is None or comparison.agree:
         return
-    apart = [p for p in comparison.pairs if not p.agree]
-    pairs = [f"{p.first} and {p.second}" for p in apart]
+    pairs = [f"{p.first} and {p.second}" for p in comparison.pairs if not p.agree]
     if len(pairs) == len(comparison.pairs) > 1:
         pairs = ["No two agree"]
-    mean = (
-        "The weighted mean is between them, and its bound is too narrow. "
-        if made.combined is not None
-        else ""
-    )
-    yield (
+    mean = "The weighted mean is between them, and its bound is too narrow. "
+    yield _limitation(
         "recorders-disagree",
-        "The recorders do not agree",
-        f"{'; '.join(pairs) or 'All together'}: the difference exceeds the 95 % bound by the "
-        f"stated uncertainties. {mean}At least one recorder has an error that is not stated: a "
-        "wrong axis, mounting position, angle, scale or clock, a sensor at the end of its range, "
-        "or a mounting that was deformed or rang. Do not rely on the answers before the cause is "
-        "found; see Consistency of the recorders.",
+        pairs="; ".join(pairs) or "All together",
+        mean=mean * (made.combined is not None),
     )
 
 
@@ -933,20 +808,10 @@ def _levers(result: CaseResult) -> Iterator[tuple[str, str, str]]:
         far = f"{plain(length_factor() * longest, 2)} {length_unit()}"
         told = f"{result.spec.point.name}, up to {far} ({name})"
         if structure is not None and structure.reported:
-            yield (
-                "shared-deformation",
-                "Deformation that all recorders share is not seen",
-                "By their differences they moved against each other with a standard deviation of "
-                f"up to {speed_words(float(structure.sd.max()))} while the force acted; that is in "
-                f"the bounds. A deformation between all and the {told}, is not.",
-            )
-            return
-        yield (
-            "rigid-vehicle",
-            "The vehicle is assumed to be rigid",
-            f"This applies between each recorder and the {told}. A floor or pillar that deformed "
-            "in between moved differently.",
-        )
+            sd = speed_words(float(structure.sd.max()))
+            yield _limitation("shared-deformation", sd=sd, point=told)
+        else:
+            yield _limitation("rigid-vehicle", point=told)
 
 
 # Limitations due to the sensors: range, missing axes, stationary stretch, sample rate.
@@ -976,27 +841,16 @@ def clipping(result: CaseResult) -> Iterator[tuple[str, str, str]]:
             axes = [k for k in range(3) if clipped[:, k].any()]
             if axes:
                 rows = np.flatnonzero(clipped.any(axis=1))
-                names = ", ".join("xyz"[k] for k in axes)
+                letters = ", ".join("xyz"[k] for k in axes)
                 said = (
-                    f"{unit.name}: its axis {names}, {len(rows)} samples between "
+                    f"{unit.name}: its axis {letters}, {len(rows)} samples between "
                     f"{instant(time[rows[0]])} and {instant(time[rows[-1]])}"
                 )
                 cut[what].append((unit.name, said))
     for what, found in cut.items():
-        if not found:
-            continue
-        follows, then = (
-            ("the true delta-V is larger", "every later position has this error")
-            if what == "accelerometer"
-            else ("the vehicle turned more", "everything resolved with its attitude has this error")
-        )
-        yield (
-            f"clipped-{what}",
-            f"{', '.join(name for name, _ in found)}: the {what} was at the end of its range, and "
-            f"{follows}",
-            f"{'; '.join(said for _, said in found)}; there is no wider range. The clipped part is "
-            f"missing and not in the bounds: along that axis {follows} than reported, and {then}.",
-        )
+        if found:
+            whose, spans = ", ".join(n for n, _ in found), "; ".join(s for _, s in found)
+            yield _limitation(f"clipped-{what}", names=whose, spans=spans)
 
 
 def assumed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
@@ -1043,7 +897,7 @@ def _each(sd: float | tuple[float, float, float], unit: str, names: str) -> str:
 
 def rest(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     """Return the shortcomings of the stationary stretch before the crash."""
-    told: dict[tuple[str, str, str], list[str]] = {}
+    told: dict[tuple[str, tuple[tuple[str, str], ...]], list[str]] = {}
     for unit, prepared in _prepared(result):
         still, level = prepared.rest, prepared.levelling
         if unit.drive is not None and (still is None or still.grade == "steady"):
@@ -1051,33 +905,17 @@ def rest(result: CaseResult) -> Iterator[tuple[str, str, str]]:
             continue
         if still is None:
             half = TWO_SIDED_95 * level.sd_deg
-            said = (
-                "no-rest",
-                "no stationary stretch before the crash",
-                f"Roll and pitch are stated, {about(level.roll_deg, half, '°')} and "
-                f"{about(level.pitch_deg, half, '°')}, or carried over from another recorder; "
-                "biases are as stated of the sensors.",
-            )
-        elif still.grade == "steady":
-            said = (
-                "steady-rest",
-                "steady before the crash, but possibly moving",
-                f"The vehicle may have moved from {instant(still.start)} to {instant(still.end)}; "
-                "acceleration and rotation over it are assumed to be zero with a bound.",
-            )
-        elif still.end - still.start < SHORT_REST:
-            said = (
-                "short-rest",
-                "a short stationary stretch",
-                f"{instant(still.end - still.start)} before the crash, from "
-                f"{instant(still.start)}: biases and leveling are less accurate, and the bounds "
-                "wider.",
-            )
+            roll, pitch = (about(angle, half, "°") for angle in (level.roll_deg, level.pitch_deg))
+            code, values = "no-rest", {"roll": roll, "pitch": pitch}
         else:
-            continue
-        told.setdefault(said, []).append(unit.name)
-    for (code, head, text), names in told.items():
-        yield code, f"{', '.join(names)}: {head}", text
+            code, values = "steady-rest", {"start": instant(still.start), "end": instant(still.end)}
+            if still.grade != "steady":
+                if still.end - still.start >= SHORT_REST:
+                    continue
+                code, values["length"] = "short-rest", instant(still.end - still.start)
+        told.setdefault((code, tuple(values.items())), []).append(unit.name)
+    for (code, items), names in told.items():
+        yield _limitation(code, names=", ".join(names), **dict(items))
 
 
 def borrowed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
@@ -1087,12 +925,7 @@ def borrowed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
         if unit.gyro is None and unit.gyro_from is not None:
             told.setdefault(unit.gyro_from, []).append(unit.name)
     for lender, names in told.items():
-        yield (
-            "borrowed-gyro",
-            f"{', '.join(names)}: no gyro",
-            f"The rotation is that of {lender}, as of a rigid vehicle. An error of that gyro "
-            "affects all, and the comparison of recorders does not show it.",
-        )
+        yield _limitation("borrowed-gyro", names=", ".join(names), lender=lender)
 
 
 def ringing(result: CaseResult) -> Iterator[tuple[str, str, str]]:
@@ -1105,64 +938,24 @@ def ringing(result: CaseResult) -> Iterator[tuple[str, str, str]]:
         if rate < RINGS and not means:
             slow.append((unit.name, rate))
     if slow:
-        which = ", ".join(f"{name} ({rate:.4g} Hz)" for name, rate in slow)
-        yield (
-            "ringing",
-            "Structural ringing is not resolved at this rate",
-            f"{which}: vibration above a quarter of the rate cannot be integrated from samples. "
-            "Ringing of 10 g at 195 Hz that decays in 30 ms shifts the path by 1 m within 750 ms "
-            "at 200 Hz, and is not in the bounds. Another consistent recorder at 1 kHz or more "
-            "excludes it.",
-        )
+        rates = ", ".join(f"{name} ({rate:.4g} Hz)" for name, rate in slow)
+        yield _limitation("ringing", rates=rates)
 
 
 # Assumptions and conventions of a crash report.
 
 
-CONVENTIONS = (
-    ("Vehicle axes", "forward, right, down, fixed in the vehicle"),
-    ("Time", "s from the trigger"),
-    (
-        "Path",
-        "north, east, down from the position of the reference point at the entry; without a stated "
-        "heading, forward and right of the vehicle at the entry instead of north and east",
-    ),
-    ("Attitude", "roll, pitch, heading (3-2-1): right side down, nose up, clockwise are positive"),
-    (
-        "Delta-V",
-        "change of velocity; a frontal crash has a negative forward component; in the axes of the "
-        "vehicle, as recorders integrate it, unless stated otherwise",
-    ),
-    (
-        "Direction of force (PDOF)",
-        "atan2(−ΔV right, −ΔV forward): 0° the front, positive clockwise from above, 90° the right "
-        "side; on the clock 12 is the front",
-    ),
-    (
-        "563 event: time zero, end",
-        "49 CFR 563.5(b): 8 km/h within 150 ms make an event; it begins with 0.8 km/h within 20 ms "
-        "and ends when the resultant change within 20 ms becomes that or less",
-    ),
-    (
-        "Contact",
-        "delta-V is that of the whole contact: from its onset, where the acceleration leaves the "
-        "level before, to where it reaches the level after; time zero lies up to 20 ms before the "
-        "onset, and in a side impact up to 16 ms after it",
-    ),
-    (
-        "Bounds",
-        "95 % (1.96 standard deviations), if the stated and assumed values are right; of a "
-        "direction, Fieller's interval",
-    ),
-)
+@cache
+def sentences() -> dict[str, Any]:
+    """Sentences of the report that do not depend on the case but by values in them."""
+    return tomllib.loads(files("strapdown.report").joinpath("crash_words.toml").read_text("utf-8"))
 
 
 def conventions() -> tuple[tuple[str, str], ...]:
     """Return the conventions, with the units that are shown."""
     units = SHOWN.get()
-    shown = f"{units.speed} for speeds, {units.length} for lengths, g = 9.80665 m/s² for "
-    shown += "accelerations; drawings of the path, and what is not named, in SI"
-    return (*CONVENTIONS, ("Units", shown))
+    rows = sentences()["conventions"].items()
+    return tuple((k, text.format(speed=units.speed, length=units.length)) for k, text in rows)
 
 
 def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
@@ -1171,151 +964,53 @@ def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
     options, entry = spec.options, spec.entry
     comparison = result.reconstruction.comparison
     bent = comparison is not None and comparison.structure.reported
-    found = [
-        (
-            "Structure",
-            "The recorders move against each other while the force acts, as learnt from their "
-            "differences; their mean moves with the reference point.",
-        )
-        if bent
-        else (
-            "Rigid vehicle",
-            "The vehicle does not deform between the recorders and the reference point.",
-        ),
-        (
-            "Errors of the sensors",
-            "are normal with zero mean, independent between recorders, and constant within the "
-            "record, with the standard deviations of the table under Sensors.",
-        ),
-        (
-            "Gravity",
-            f"is {options.gravity_m_per_s2:g} m/s² and vertical throughout; the Earth rate is "
-            "taken into account.",
-        ),
-        (
-            "Samples",
-            f"The records are resampled to {options.rate_hz:g} Hz as "
-            + (
-                "means over each step."
-                if options.sampling == "mean"
-                else "values of a band-limited signal; the delay of each low-pass is its time "
-                "constant."
-            ),
-        ),
-        (
-            "Clocks",
-            "are synchronized by each recorder's trigger with its stated uncertainty."
-            if options.clock == "trigger"
-            else "are synchronized by correlation of the recorded signals.",
-        ),
-    ]
+    keys = ["bent" if bent else "rigid", "errors", "gravity", options.sampling, options.clock]
+    values: dict[str, Any] = {"at": instant(entry.time_s), "source": entry.source or "not stated"}
     if entry.kind == "speed":
         assert entry.speed_m_per_s is not None and entry.speed_sd_m_per_s is not None
         half = TWO_SIDED_95 * entry.speed_sd_m_per_s
-        direction = TWO_SIDED_95 * entry.slip_sd_deg
-        found.append(
-            (
-                "Entry",
-                f"At {instant(entry.time_s)} the vehicle moved at "
-                f"{speed(entry.speed_m_per_s, half)}, {entry.slip_deg:g} ± {direction:.2g}° "
-                f"clockwise of its heading, and level within "
-                f"{TWO_SIDED_95 * entry.climb_sd_m_per_s:.2g} m/s. Source: "
-                f"{entry.source or 'not stated'}.",
-            )
-        )
-    elif entry.kind == "standstill":
-        found.append(("Entry", "The vehicle was stationary when the record began."))
-    elif entry.kind == "gnss":
-        found.append(
-            (
-                "Entry",
-                "GNSS fixes have their stated uncertainty; they are not used beyond 50 m/s² or "
-                "20 m/s³, nor from the impact on.",
-            )
-        )
+        values |= {
+            "speed": speed(entry.speed_m_per_s, half),
+            "direction": TWO_SIDED_95 * entry.slip_sd_deg,
+            "climb": TWO_SIDED_95 * entry.climb_sd_m_per_s,
+        }
+    keys += [entry.kind] * (entry.kind != "speed_record")
     if entry.speed_path is not None:
-        found.append(
-            (
-                "Speeds of the wheels",
-                f"have a relative error of ± {TWO_SIDED_95 * entry.speed_scale_sd_percent:.2g} % "
-                f"and are {entry.speed_delay_s:.2g} ± {TWO_SIDED_95 * entry.speed_delay_sd_s:.2g} "
-                "s late; they are not used beyond 4 m/s², where wheels slip.",
-            )
-        )
+        keys.append("wheels")
+        values["scale"] = TWO_SIDED_95 * entry.speed_scale_sd_percent
+        values["delay"] = TWO_SIDED_95 * entry.speed_delay_sd_s
     if entry.kind in OF_DRIVES and (entry.slip_sd_deg or entry.speed_path is not None):
         from strapdown.crash.drive_entry import CAR
 
-        slip = TWO_SIDED_95 * (entry.slip_sd_deg or CAR["side_slip_sd_deg"])
-        found.append(
-            (
-                "Drive before the crash",
-                f"The rear axle travels along the vehicle within {slip:.2g}°; biases, scale "
-                "factors and mounting are those of the crash.",
-            )
-        )
+        keys.append("drive")
+        values["slip"] = TWO_SIDED_95 * (entry.slip_sd_deg or CAR["side_slip_sd_deg"])
+    values = options.model_dump() | entry.model_dump() | values
+    found = [sentences()["assumptions"][key] for key in keys]
     reasons: dict[str, list[str]] = {}
     for unit in spec.units:
         if unit.assumed is not None and unit.assumed.because:
             reasons.setdefault(unit.assumed.because, []).append(unit.name)
-    for because, names in reasons.items():
-        found.append((", ".join(names), f"Reason for the assumed axes: {because}"))
-    return tuple(found)
+    return (
+        *((head, text.format(**values)) for head, text in found),
+        *((", ".join(n), f"Reason for the assumed axes: {why}") for why, n in reasons.items()),
+    )
 
 
 def method(result: CaseResult) -> tuple[str, ...]:
     """Return the processing steps from the records to the answers, in order."""
-    steps = [
-        "The recorders are synchronized to the trigger, and all channels are resampled to common "
-        "stamps without aliasing; the delay of each low-pass is removed.",
-        "The stationary stretch before the crash gives the gyro bias, the bias of a high range "
-        "relative to a low one, and roll and pitch; without one, stated values are used.",
-        "Ranges are merged: the low one below its end, the high one beyond.",
-        "Each recorder is rotated into vehicle axes and transferred to the reference point.",
-        "Events are detected, and delta-V is integrated in the axes of the vehicle and, with "
-        "gravity removed, over ground.",
-        "The path is computed from the entry, forward and backward, by strapdown navigation.",
-        "Every unknown of the sensors, mounting, clocks and entry is propagated through all steps, "
-        "linearly"
-        + (
-            "."
-            if result.samples is None
-            else f", and by {len(result.samples.errors)} Monte Carlo runs."
-        ),
-    ]
+    said, samples = sentences()["method"], result.samples
+    runs = "" if samples is None else f", and by {len(samples.errors)} Monte Carlo runs"
+    steps = [*said["steps"]]
     if len(result.units) > 1:
-        steps.append(
-            "The recorders are compared at the reference point"
-            + (
-                ", and their weighted mean is reconstructed as well."
-                if result.reconstruction.combined is not None
-                else "."
-            )
-        )
-    return tuple(steps)
+        steps.append(said["compared"])
+    mean = ", and their weighted mean is reconstructed as well"
+    mean *= result.reconstruction.combined is not None
+    return tuple(step.format(runs=runs, mean=mean) for step in steps)
 
 
 def how_to_verify() -> tuple[tuple[str, str], ...]:
     """Return ways to check the report, besides the command."""
-    return (
-        (
-            "Repeat the run",
-            "Install the version of strapdown on page one, whose source has the digest in "
-            "manifest.json, and run the command below. It checks every file against the seal, "
-            "repeats the case from the records, compares each byte, and names every changed file "
-            "and option.",
-        ),
-        (
-            "The seal",
-            "is the SHA-256 of manifest.json, which has that of every file of the folder. It was "
-            "printed with the report: keep it apart from the folder, so that a change of a file "
-            "together with the manifest is detected.",
-        ),
-        (
-            "Independently",
-            "The records are in inputs/, the path in trajectory.csv and all numbers in "
-            "crash.json, with their units in the names.",
-        ),
-    )
+    return tuple(sentences()["how_to_verify"].items())
 
 
 # Quantities that a drive determines.

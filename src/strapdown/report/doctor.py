@@ -36,7 +36,14 @@ from strapdown.report.document import (
 )
 from strapdown.report.report_bundle import bundle_by_specification, finite, with_page
 from strapdown.report.values import duration_words, instant, small
-from strapdown.systems.doctor import USES, Diagnosis, LogDiagnosis, refused_fixes, run_doctor
+from strapdown.systems.doctor import (
+    USES,
+    Diagnosis,
+    LogDiagnosis,
+    of_other_file,
+    refused_fixes,
+    run_doctor,
+)
 from strapdown.tables import ACCEL, GEODETIC, GYRO, VELOCITY, VELOCITY_SD, find_gaps
 from strapdown.tables.checks import HEIGHTS_AS_STATED, height_words, index_of, values_of
 
@@ -88,7 +95,7 @@ def _listed(findings: Iterable[Finding], words: Words) -> list[Any]:
 def headline(one: LogDiagnosis) -> str:
     """Say what a log is fit for, in one sentence."""
     if not uses(one):
-        held = " and ".join(str(s["name"]) for s in one.data["streams"])
+        held = " and ".join(str(s["name"]) for s in one.data["streams"]) or "fixes, not read yet"
         if log := one.data["fixes_for"]:
             return f"{one.name}: {held}, examined as the fixes of {log}."
         return f"{one.name}: {held} without inertial samples; give it beside an IMU log."
@@ -106,7 +113,8 @@ def headline(one: LogDiagnosis) -> str:
 
 def uses(one: LogDiagnosis) -> tuple[str, ...]:
     """Return the uses that a log is judged for: none of fixes or a reference alone."""
-    return () if one.streams and "imu" not in one.streams and not one.questions else USES
+    alone = one.streams and "imu" not in one.streams and not one.questions
+    return () if alone or one.data["fixes_for"] else USES
 
 
 def reasons(one: LogDiagnosis, use: str) -> str:
@@ -178,11 +186,12 @@ def wrong(one: LogDiagnosis) -> list[tuple[str, str, str]]:
     """List the location, sentence and fix of each question and fault."""
     return [
         (
-            ", ".join(p for p in (f.quantity, f.row and f"row {f.row}") if p),
+            ", ".join(p for p in (file, f.quantity, f.row and f"row {f.row}") if p),
             f.sentence("cli"),
             f.advice("cli") or "",
         )
         for f in (*one.questions, *one.faults)
+        for file in (of_other_file(one, f) and f.file,)
     ]
 
 
@@ -289,7 +298,7 @@ def doctor_document(result: Diagnosis, name: str = "") -> Document:
     if name:
         sections.append(section("again", "Check this folder", *run_again(name)))
     title = ", ".join(one.name for one in result.logs)
-    names = [one.name for one in result.logs]
+    names = [Path(log.path).resolve().name for log in result.spec.logs]
     front = (block for one in result.logs for block in _answer(one, names))
     return document_of(title, "Content of the log, and its faults", (), front, sections)
 

@@ -23,10 +23,8 @@ if TYPE_CHECKING:
 class Paragraph:
     """A paragraph of plain text, never interpreted as markup.
 
-    Attributes
-    ----------
-    kind : {'plain', 'lead', 'note', 'warning', 'mono'}
-        ``lead`` is the one paragraph of page one; ``mono`` a command or digest.
+    `kind`, {'plain', 'lead', 'note', 'warning', 'mono'}: ``lead`` is the one paragraph of page one;
+    ``mono`` a command or digest.
     """
 
     text: str
@@ -59,16 +57,9 @@ class Facts:
 class TableBlock:
     """A table.
 
-    Attributes
-    ----------
-    columns : tuple of str
-        With units.
-    text : tuple of int
-        Left-aligned text columns; the others are right-aligned numbers.
-    strong : tuple of int
-        Emphasized rows, such as a sum.
-    passed : frozenset of (int, int)
-        Row and column of cells within a tolerance; these also have a tick.
+    `columns`: with units. `text`: left-aligned text columns; the others are right-aligned numbers.
+    `strong`: emphasized rows, such as a sum. `passed`: row and column of cells within a tolerance;
+    these also have a tick.
     """
 
     columns: tuple[str, ...]
@@ -84,16 +75,8 @@ class TableBlock:
 class Picture:
     """A custom SVG picture, the same in page and PDF.
 
-    Attributes
-    ----------
-    slug : str
-        File name among the figures.
-    svg : str
-        A whole SVG; all external text in it is escaped.
-    alt : str
-        Text alternative for readers who cannot see it.
-    width_mm : float
-        On paper.
+    `slug`: file name among the figures. `svg`: a whole SVG; all external text in it is escaped.
+    `alt`: text alternative for readers who cannot see it. `width_mm`: on paper.
     """
 
     slug: str
@@ -151,14 +134,8 @@ class Section:
 
     On paper every section is whole.
 
-    Attributes
-    ----------
-    slug : str
-        Its anchor.
-    folded : bool
-        Whether the page shows its heading alone, until a reader opens it.
-    figures : int
-        Of its figures so many are shown at most; the others are behind a fold at its end.
+    `slug`: its anchor. `folded`: whether the page shows its heading alone, until a reader opens it.
+    `figures`: of its figures so many are shown at most; the others are behind a fold at its end.
     """
 
     slug: str
@@ -188,16 +165,9 @@ def section(
 class Document:
     """A whole report.
 
-    Attributes
-    ----------
-    facts : tuple of (str, str)
-        Under the title: case, vehicle, software.
-    front : tuple of Block
-        Page one.
-    footer : str
-        On every page of the PDF, beside the page number.
-    links : tuple of (str, str)
-        Files beside the page, with their descriptions; in the page only.
+    `facts`: under the title: case, vehicle, software. `front`: page one. `footer`: on every page of
+    the PDF, beside the page number. `links`: files beside the page, with their descriptions; in the
+    page only.
     """
 
     title: str
@@ -323,13 +293,8 @@ WORDS = {
 class Trust:
     """Verdict on an answer, with its reasons.
 
-    Attributes
-    ----------
-    verdict : {'trusted', 'reserve', 'distrusted'}
-    reasons : tuple of Finding
-        A note supports the answer, a warning contradicts it.
-    short : tuple of Finding
-        Supporting reasons in short form.
+    `verdict`, {'trusted', 'reserve', 'distrusted'}. `reasons`: a note supports the answer, a
+    warning contradicts it. `short`: supporting reasons in short form.
     """
 
     verdict: str
@@ -504,10 +469,7 @@ Place = Callable[[str], str]
 def draw_stills(document: Document) -> tuple[str, ...]:
     """Draw the charts of a document for paper.
 
-    Returns
-    -------
-    tuple of str
-        One SVG per chart, in document order.
+    Returns: one SVG per chart, in document order.
     """
     from strapdown.report.chart_svg import still
 
@@ -519,28 +481,10 @@ def document_data(
 ) -> dict[str, Any]:
     """Return a document as data for a template.
 
-    Parameters
-    ----------
-    document : Document
-        Its texts are made plain here.
-    stills : sequence of str
-        From `draw_stills`.
-    place : callable
-        Takes a whole SVG and returns the template's reference to it.
-    alive : bool
-        For the page: a chart has its drawing under ``svg``, an animation its scene.
-
-    Returns
-    -------
-    dict
-        Strings, numbers, lists and dicts.
-
-    Raises
-    ------
-    DataError
-        If a picture is not XML.
-    ValueError
-        If a row of a table does not have as many cells as there are columns.
+    `document`: its texts are made plain here. `stills`: from `draw_stills`. `place`: takes a whole
+    SVG and returns the template's reference to it. `alive`: for the page: a chart has its drawing
+    under ``svg``, an animation its scene. `DataError`: if a picture is not XML. `ValueError`: if a
+    row of a table does not have as many cells as there are columns.
     """
     plain = document.plain
     writer = _Writer(iter(stills), place, alive)
@@ -704,10 +648,7 @@ def drawings(document: Document) -> list[Chart | Picture | Animation]:
 def write_drawings(document: Document, stills: Sequence[str], folder: Path) -> None:
     """Write every drawing of a report to a folder, which is created.
 
-    Parameters
-    ----------
-    stills : sequence of str
-        Drawn charts from `draw_stills`, one per chart.
+    `stills`: drawn charts from `draw_stills`, one per chart.
     """
     folder.mkdir()
     drawn = iter(stills)

@@ -49,20 +49,11 @@ def write_report(
 def document_page(document: Document, *, stills: Sequence[str] | None = None) -> str:
     """Lay out a document as an HTML page.
 
-    Parameters
-    ----------
-    document : Document
-        Its texts are made plain, then escaped.
-    stills : sequence of str, optional
-        Drawn charts from `draw_stills`, if already made.
-
-    Returns
-    -------
-    str
-        HTML, the same for the same document, whole without scripts but for scenes that move.
-        Charts are SVG of `chart_svg`, with every text escaped; pictures are embedded as images,
-        which cannot run scripts or fetch resources. A content policy in the page allows its own
-        script and no other.
+    `document`: its texts are made plain, then escaped. `stills`: drawn charts from `draw_stills`,
+    if already made. Returns: HTML, the same for the same document, whole without scripts but for
+    scenes that move. Charts are SVG of `chart_svg`, with every text escaped; pictures are embedded
+    as images, which cannot run scripts or fetch resources. A content policy in the page allows its
+    own script and no other.
     """
     drawn = draw_stills(document) if stills is None else stills
     data = document_data(document, drawn, _image, alive=True)

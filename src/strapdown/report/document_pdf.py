@@ -102,10 +102,7 @@ def _compiled(typst: Any, folder: Path) -> bytes:
 def typst_library() -> Any:
     """Return typst, which lays out PDF and PNG.
 
-    Raises
-    ------
-    ConfigError
-        It is not installed.
+    `ConfigError`: it is not installed.
     """
     try:
         import typst
@@ -162,15 +159,8 @@ _BEYOND = re.compile(r"[^\x00-\x7f]")
 def shown(text: str) -> str:
     """Return text in which every character has a glyph.
 
-    Parameters
-    ----------
-    text : str
-        Plain, or JSON or SVG, whose own signs are ASCII.
-
-    Returns
-    -------
-    str
-        A character without a glyph is written as its code point, such as ``[U+1F697]``.
+    `text`: plain, or JSON or SVG, whose own signs are ASCII. A character without a glyph is written
+    as its code point, such as ``[U+1F697]``.
     """
     if text.isascii():
         return text

@@ -9,7 +9,7 @@ import numpy as np
 
 from strapdown import rotation
 from strapdown.bundle import write_json
-from strapdown.config.extrinsics import ExtrinsicsSpec
+from strapdown.config.navigation import ExtrinsicsSpec
 from strapdown.config.toml_text import array, number, string
 from strapdown.evaluation.extrinsics import Estimate
 from strapdown.navigation.record import innovation_labels

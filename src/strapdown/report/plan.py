@@ -33,10 +33,7 @@ _HALF_DAY = 43200.0
 class PlanView:
     """Extent of a plan with equal scales.
 
-    Attributes
-    ----------
-    low, high : ndarray, (2,)
-        East and north of its corners.
+    `low`, `high`, (2,): east and north of its corners.
     """
 
     low: Array
@@ -46,12 +43,8 @@ class PlanView:
     def of(cls, paths: list[Path], most: float = _MOST) -> PlanView:
         """Smallest view of all paths with a panel neither too low nor too high.
 
-        Parameters
-        ----------
-        paths : list of (ndarray, ndarray)
-            East and north of each.
-        most : float
-            Largest height of the panel over its width, for one as wide as the picture.
+        `paths`: east and north of each. `most`: largest height of the panel over its width, for one
+        as wide as the picture.
         """
         points = np.hstack([np.vstack(path) for path in paths])
         low, high = points.min(axis=1), points.max(axis=1)
@@ -80,14 +73,8 @@ class PlanView:
 def path_marks(time: Array, paths: list[Path], view: PlanView, colour: str) -> list[Line]:
     """Mark start, end, and positions at round times on the first path, with arrows between them.
 
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-        Times of the points of the first path.
-    paths : list of (ndarray, ndarray)
-        East and north of each; labels avoid all paths.
-    colour : str
-        Color of the arrows.
+    `time`, (n,), s: times of the points of the first path. `paths`: east and north of each; labels
+    avoid all paths. `colour`: color of the arrows.
     """
     east, north = paths[0]
     way = _way(east, north)
@@ -190,18 +177,9 @@ def place_labels(
 ) -> tuple[tuple[int, int], ...]:
     """Choose a position for each label, the longest label first.
 
-    Parameters
-    ----------
-    x, y : array_like, (n,)
-        Points on linear axes (logarithms for a logarithmic axis).
-    obstacles : array_like, (m, 2)
-        Further points that labels should avoid.
-
-    Returns
-    -------
-    tuple of (int, int)
-        Entries of `PLACES`, in the order of the labels, with the least overlap with other labels,
-        points and the outside of the axes.
+    `x`, `y`, (n,): points on linear axes (logarithms for a logarithmic axis). `obstacles`, (m, 2):
+    further points that labels should avoid. Returns: entries of `PLACES`, in the order of the
+    labels, with the least overlap with other labels, points and the outside of the axes.
     """
     if not labels:
         return ()
@@ -255,15 +233,8 @@ _CORNERS = 28
 def ellipse(centre: Array, covariance: Array, corners: int = _CORNERS) -> Array:
     """95 % ellipse of a normal error in a plane.
 
-    Parameters
-    ----------
-    centre : ndarray, (2,)
-    covariance : ndarray, (2, 2)
-
-    Returns
-    -------
-    ndarray, (corners, 2)
-        Points on the ellipse; all at the center if the error is zero.
+    `centre`, (2,). `covariance`, (2, 2). Returns: (corners, 2), points on the ellipse; all at the
+    center if the error is zero.
     """
     values, vectors = np.linalg.eigh(np.where(np.isfinite(covariance), covariance, 0.0))
     turn = np.linspace(0.0, 2.0 * math.pi, corners, endpoint=False)
@@ -297,17 +268,8 @@ def hull(points: Array) -> Array:
 def envelope(places: Array, covariances: Array, pieces: int = 60) -> list[Array]:
     """Areas that together cover the ellipses along a path.
 
-    Parameters
-    ----------
-    places : ndarray, (n, 2)
-    covariances : ndarray, (n, 2, 2)
-    pieces : int
-        Maximum number of areas.
-
-    Returns
-    -------
-    list of ndarray, (k, 2)
-        Convex hulls of consecutive pairs of ellipses, without gaps between them.
+    `places`, (n, 2). `covariances`, (n, 2, 2). `pieces`: maximum number of areas. Returns: (k, 2),
+    convex hulls of consecutive pairs of ellipses, without gaps between them.
     """
     rows = np.unique(np.linspace(0, len(places) - 1, min(pieces + 1, len(places))).astype(int))
     rings = [ellipse(places[k], covariances[k]) for k in rows]

@@ -76,19 +76,11 @@ def with_page(
 class ReportBundle(Generic[R]):
     """How the runs of one command are sealed.
 
-    Attributes
-    ----------
-    configuration : callable
-        From a run to its sealed configuration.
-    run : callable
-        From a sealed configuration to the run.
-    write_files : callable
-        Writes the files of a run into a folder. Takes the run, the folder, the name shown in the
-        report, the forms of the report (``html``, ``pdf``; none for the data alone), and progress.
-    pdf : bool
-        Whether the report is a PDF, too, where typst is installed.
-    prepared : callable
-        From a run, and whether it has a report, to a context in which the run has further inputs.
+    `configuration`: from a run to its sealed configuration. `run`: from a sealed configuration to
+    the run. `write_files`: writes the files of a run into a folder. Takes the run, the folder, the
+    name shown in the report, the forms of the report (``html``, ``pdf``; none for the data alone),
+    and progress. `pdf`: whether the report is a PDF, too, where typst is installed. `prepared`:
+    from a run, and whether it has a report, to a context in which the run has further inputs.
     """
 
     command: str

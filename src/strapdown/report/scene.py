@@ -16,22 +16,10 @@ _DIGITS = 4  # a tenth of a millimeter
 class SceneBody:
     """A rigid body with its pose in each frame.
 
-    Attributes
-    ----------
-    corners : ndarray, (n, 3), m
-        In body axes.
-    faces : tuple of tuple of int
-        Corners of each face, convex.
-    colours : tuple of str
-        One per face.
-    q : ndarray, (frames, 4)
-        Body to scene, scalar first; a row of NaN hides the body.
-    positions : ndarray, (frames, 3), m, or None
-        Of the body's origin; None for the origin of the scene.
-    wire : bool
-        Edges alone, dashed.
-    axes : tuple of (str, (float, float, float), str)
-        Name, tip in body axes and color of arrows from the body's origin.
+    `corners`, (n, 3), m: in body axes. `faces`: corners of each face, convex. `colours`: one per
+    face. `q`, (frames, 4): body to scene, scalar first; a row of NaN hides the body. `positions`,
+    (frames, 3), m, or None: of the body's origin; None for the origin of the scene. `wire`: edges
+    alone, dashed. `axes`: name, tip in body axes and color of arrows from the body's origin.
     """
 
     corners: Array = field(repr=False)
@@ -70,20 +58,10 @@ class SceneWord:
 class Scene:
     """Bodies, lines and texts in space, seen in parallel projection; axes north, east, down.
 
-    Attributes
-    ----------
-    frames : tuple of str
-        Name of each frame, with its unit.
-    low, high : ndarray, (3,), m
-        Corners of the drawn space.
-    interval_ms : float
-        Between frames in playback.
-    view : (float, float), deg
-        Azimuth of the viewer, clockwise from north, and elevation.
-    trail : tuple of (str, str)
-        Name and color of the path of the first body up to the frame, if any.
-    height : int
-        Pixels.
+    `frames`: name of each frame, with its unit. `low`, `high`, (3,), m: corners of the drawn space.
+    `interval_ms`: between frames in playback. `view`, deg: azimuth of the viewer, clockwise from
+    north, and elevation. `trail`: name and color of the path of the first body up to the frame, if
+    any. `height`: pixels.
     """
 
     bodies: tuple[SceneBody, ...]

@@ -31,8 +31,8 @@ from strapdown.report.document import (
 )
 from strapdown.report.report_bundle import ReportBundle, finite, with_page
 from strapdown.report.values import length_words, three_digits
-from strapdown.sensors.allan import allan_model
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, SENSORS, Sensor, load_sensor
+from strapdown.sensors.noise_terms import allan_model
 from strapdown.sensors.triad_errors import TriadErrors
 from strapdown.sensors.uncertainty import uncertainty_of
 from strapdown.systems.inputs import Memory, SavedRun

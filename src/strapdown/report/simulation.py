@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from strapdown.formats.writers import (
     write_attitude_csv,
 )
 from strapdown.frames import ned_from_geodetic
-from strapdown.report.chart import BLUE, ORANGE, Chart, Line, Panel, break_jumps, curve
+from strapdown.report.chart import BLUE, Chart, Line, Panel, break_jumps, curve
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.crash_simulation import stated_errors
 from strapdown.report.plan import PlanView, path_marks
@@ -233,31 +233,8 @@ _FAR = 20e3
 _LOW = 0.6  # height of a panel over time
 
 
-@dataclass(frozen=True)
-class _Drawn:
-    """One trajectory, its thinned path in meters about the start, and its style."""
-
-    table: pd.DataFrame
-    time: Array
-    east: Array
-    north: Array
-    left_out: str
-    name: str
-    colour: str
-    dash: str
-    legend: bool
-
-    def column(self, name: str) -> Array:
-        return self.table[name].to_numpy(dtype=np.float64)
-
-
 def trajectory_chart(
-    trajectory: pd.DataFrame,
-    other: pd.DataFrame | None = None,
-    *,
-    title: str,
-    names: tuple[str, str] = ("trajectory", "other"),
-    ellipsoid: Ellipsoid = WGS84,
+    trajectory: pd.DataFrame, *, title: str, ellipsoid: Ellipsoid = WGS84
 ) -> Chart:
     """Chart a trajectory: plan, height, speed and attitude over time.
 
@@ -265,10 +242,6 @@ def trajectory_chart(
     ----------
     trajectory : DataFrame
         A Trajectory table. The plan is about its first position.
-    other : DataFrame, optional
-        A second one on the same clock, a reference or an estimate, drawn over the first.
-    names : (str, str)
-        Of the two, for the legend; a single trajectory has no legend.
 
     Returns
     -------
@@ -284,16 +257,21 @@ def trajectory_chart(
         A position is invalid, as in `frames.ned_from_geodetic`.
     """
     origin = places_of(trajectory.iloc[:1])[0]
-    drawn = [_drawn(trajectory, origin, ellipsoid, names[0], other is not None)]
-    if other is not None:
-        second = _drawn(other, origin, ellipsoid, names[1], True)
-        drawn.append(replace(second, colour=ORANGE, dash="dash"))
-    reach = max(float(np.ptp(v)) for d in drawn for v in (d.east, d.north))
-    rise = float(np.ptp(np.concatenate([d.column("alt") for d in drawn])))
+    thinned = thin(trajectory, MOST_POINTS, ellipsoid)
+    kept = trajectory.iloc[thinned.rows]
+    north, east, _ = ned_from_geodetic(places_of(kept), origin, ellipsoid=ellipsoid).T
+    time = index_of(trajectory)
+
+    def over_time(label: str, values: Array) -> Panel:
+        line = replace(curve("trajectory", time, values, BLUE, buckets=BUCKETS), legend=False)
+        return Panel(label, (line,), height=_LOW, steady=_STEADY)
+
+    height, v_n, v_e = (trajectory[c].to_numpy(dtype=np.float64) for c in ("alt", "VN", "VE"))
+    reach, rise = float(max(np.ptp(east), np.ptp(north))), float(np.ptp(height))
     at = f"{origin[0]:.6g}°, {origin[1]:.6g}°, {origin[2]:.6g} m"
     panels: list[Panel] = []
     if reach >= NO_PATH:
-        panels.append(_plan(drawn, reach))
+        panels.append(_plan(index_of(kept), east, north, reach))
         words = [
             f"Plan: in the level plane at the start ({at}), to one scale; arrows: direction of "
             "motion."
@@ -301,65 +279,38 @@ def trajectory_chart(
     else:
         words = [f"It stays at its place ({at})."]
     if reach >= NO_PATH or rise >= NO_PATH:
-        speeds = [np.hypot(d.column("VN"), d.column("VE")) for d in drawn]
-        panels += [
-            _over_time("height, m", drawn, [d.column("alt") for d in drawn]),
-            _over_time("speed, m/s", drawn, speeds),
-        ]
+        panels += [over_time("height, m", height), over_time("speed, m/s", np.hypot(v_n, v_e))]
         words.append(f"Height over the ellipsoid ({ellipsoid.name}); speed over the ground.")
-    angles = {name: [d.column(name) for d in drawn] for name in EULER}
+    angles = {name: trajectory[name].to_numpy(dtype=np.float64) for name in EULER}
     angles["heading"], wrapped = _wrapped(angles["heading"])
-    panels += [_over_time(f"{k}, deg", drawn, v) for k, v in angles.items()]
+    panels += [over_time(f"{name}, deg", values) for name, values in angles.items()]
     words.append(
         "Body forward-right-down relative to north-east-down, 3-2-1 angles; heading "
         f"{wrapped}, clockwise from north."
     )
-    if reach >= NO_PATH:
-        words += [d.left_out for d in drawn if d.left_out]
+    if reach >= NO_PATH and len(kept) < len(trajectory):
+        words.append(f"Plan: {thinned.sentence}")
     return Chart("trajectory", title, " ".join(words), "time, s", tuple(panels))
 
 
-def _drawn(
-    table: pd.DataFrame, origin: Array, ellipsoid: Ellipsoid, name: str, legend: bool
-) -> _Drawn:
-    thinned = thin(table, MOST_POINTS, ellipsoid)
-    kept = table.iloc[thinned.rows]
-    ned = ned_from_geodetic(places_of(kept), origin, ellipsoid=ellipsoid)
-    left_out = ""
-    if len(kept) < len(table):
-        left_out = f"Plan{f', {name}' if legend else ''}: {thinned.sentence}"
-    time = index_of(kept)
-    return _Drawn(table, time, ned[:, 1], ned[:, 0], left_out, name, BLUE, "solid", legend)
-
-
-def _plan(drawn: list[_Drawn], reach: float) -> Panel:
-    """The paths, with the start, the end, the direction and the times of the first."""
+def _plan(time: Array, east: Array, north: Array, reach: float) -> Panel:
+    """The path, with its start, end, direction and times."""
     unit, scale = ("km", 1e-3) if reach >= _FAR else ("m", 1.0)
-    paths = [(scale * d.east, scale * d.north) for d in drawn]
-    view = PlanView.of(paths)
+    path = (scale * east, scale * north)
+    view = PlanView.of([path])
     lines = [
-        Line(d.name, *path, d.colour, d.dash, 1.8, legend=d.legend)
-        for d, path in zip(drawn, paths, strict=True)
+        Line("trajectory", *path, BLUE, "solid", 1.8, legend=False),
+        *path_marks(time, [path], view, BLUE),
     ]
-    lines += path_marks(drawn[0].time, paths, view, drawn[0].colour)
-    east, north = (f"{side} of the start, {unit}" for side in ("east", "north"))
-    return Panel(north, tuple(lines), x_label=east, height=view.height)
+    x_label, y_label = (f"{side} of the start, {unit}" for side in ("east", "north"))
+    return Panel(y_label, tuple(lines), x_label=x_label, height=view.height)
 
 
-def _over_time(label: str, drawn: list[_Drawn], values: list[Array]) -> Panel:
-    lines = []
-    for d, v in zip(drawn, values, strict=True):
-        line = curve(d.name, index_of(d.table), v, d.colour, d.dash, buckets=BUCKETS)
-        lines.append(replace(line, legend=d.legend))
-    return Panel(label, tuple(lines), height=_LOW, steady=_STEADY)
-
-
-def _wrapped(headings: list[Array]) -> tuple[list[Array], str]:
+def _wrapped(heading: Array) -> tuple[Array, str]:
     """Headings within the full turn, from north or from south, that breaks them least."""
     ranges = (
-        ("0 to 360°", [h % 360.0 for h in headings]),
-        ("−180 to 180°", [(h + 180.0) % 360.0 - 180.0 for h in headings]),
+        ("0 to 360°", heading % 360.0),
+        ("−180 to 180°", (heading + 180.0) % 360.0 - 180.0),
     )
-    broken = [(words, [break_jumps(h) for h in found]) for words, found in ranges]
-    words, best = min(broken, key=lambda one: sum(int(np.isnan(h).sum()) for h in one[1]))
-    return best, words
+    broken = [(break_jumps(found), words) for words, found in ranges]
+    return min(broken, key=lambda one: int(np.isnan(one[0]).sum()))

@@ -79,17 +79,8 @@ def overlap(a: Box | Array, b: Box | Array) -> float:
 class Drawing:
     """Sequence of SVG elements; y points down the page.
 
-    Parameters
-    ----------
-    width, height : float
-        In pixels, 1/96 inch at the picture's size on paper.
-    alt : str
-        Text alternative for the picture.
-
-    Attributes
-    ----------
-    boxes : list of (str, Box)
-        Extent of each line of text, for the placement of others.
+    `width`, `height`: in pixels, 1/96 inch at the picture's size on paper. `alt`: text alternative
+    for the picture. `boxes`: extent of each line of text, for the placement of others.
     """
 
     def __init__(self, width: float, height: float, alt: str = "") -> None:

@@ -53,10 +53,7 @@ NOT_ESTIMATED = "not estimated"
 def plain(value: float, places: int) -> str:
     """Format a number with fixed decimals, a real minus sign, and zero without a sign.
 
-    Returns
-    -------
-    str
-        A dash for NaN or infinity.
+    A dash for NaN or infinity.
     """
     if not math.isfinite(value):
         return "–"
@@ -78,15 +75,7 @@ def decimals(size: float, digits: int = 3, *, least: int = 0, most: int = 6) -> 
 def about(value: float, half: float, unit: str) -> str:
     """Format a value with the half width of its bound.
 
-    Parameters
-    ----------
-    value, half : float
-        In the given unit.
-
-    Returns
-    -------
-    str
-        As ``7.34 ± 0.27 m/s``, with no-break spaces: `bounded`.
+    `value`, `half`: in the given unit. As ``7.34 ± 0.27 m/s``, with no-break spaces: `bounded`.
     """
     said, bound = bounded(value, half)
     if not bound:
@@ -97,18 +86,10 @@ def about(value: float, half: float, unit: str) -> str:
 def bounded(value: float, below: float, above: float | None = None) -> tuple[str, str]:
     """Format a value and its bound, all to two digits of the bound: the one way for both.
 
-    Parameters
-    ----------
-    value : float
-    below, above : float
-        Half widths of the bound, in the unit of the value; `above` is `below` if not given, and
-        infinite ends are open.
-
-    Returns
-    -------
-    tuple of str
-        ``("63.8", "± 2.5")``; ``("0.0000", "± 0.0031")``; ``("63.8", "+∞ −2.5")``; the bound is
-        empty if both ends are open, and the value then to four digits.
+    `below`, `above`: half widths of the bound, in the unit of the value; `above` is `below` if not
+    given, and infinite ends are open. Returns: ``("63.8", "± 2.5")``; ``("0.0000", "± 0.0031")``;
+    ``("63.8", "+∞ −2.5")``; the bound is empty if both ends are open, and the value then to four
+    digits.
     """
     above = below if above is None else above
     ends = [half for half in (below, above) if math.isfinite(half)]
@@ -125,16 +106,8 @@ def bounded(value: float, below: float, above: float | None = None) -> tuple[str
 def on_ground(deg: float, half: float | None) -> tuple[str, str]:
     """Format a latitude or longitude, deg, to two digits of its bound, which is in m.
 
-    Parameters
-    ----------
-    deg : float
-    half : float or None, m
-        Half width of the bound along the ground; without one to a centimeter.
-
-    Returns
-    -------
-    tuple of str
-        ``("37.725491°", "± 1.2")``; the bound is empty without one.
+    `half`, m: half width of the bound along the ground; without one to a centimeter. Returns:
+    ``("37.725491°", "± 1.2")``; the bound is empty without one.
     """
     if half is None:
         return f"{plain(deg, PLACES)}°", ""

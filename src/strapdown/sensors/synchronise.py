@@ -10,7 +10,13 @@ import numpy as np
 import pandas as pd
 
 from strapdown.errors import ConfigError, DataError, Finding, add_warning
-from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
+from strapdown.sensors.crash_unit import (
+    CrashUnit,
+    Mounting,
+    RecordedTriad,
+    with_filled_axes,
+    with_gyro,
+)
 from strapdown.sensors.error_chain import time_constant
 from strapdown.sensors.triad_channels import TriadChannels, triad_channels
 from strapdown.sensors.triad_errors import finite
@@ -25,7 +31,6 @@ from strapdown.sensors.unit_clocks import (
     clocks_by_trigger,
     onto_stamps,
 )
-from strapdown.sensors.unmeasured import with_filled_axes, with_gyro
 from strapdown.tables import ACCEL, GYRO, SAMPLINGS
 from strapdown.tables.checks import Array
 

@@ -12,12 +12,16 @@ import json
 import logging
 import math
 import os
+import re
+import tempfile
 import threading
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
+from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -28,16 +32,304 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from strapdown import __version__
 from strapdown.bundle.atomic_folder import replace_file
-from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
+from strapdown.config.toml_text import string
+from strapdown.crash.events import KMH
+from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
+from strapdown.formats.live_journal import JOURNAL
 from strapdown.formats.map_tiles import Tile, open_map
-from strapdown.studio.events import Events, states_of
 from strapdown.studio.folder import Folder, plain_name, repeating
 from strapdown.studio.guard import SANDBOX
-from strapdown.studio.jobs import Jobs
-from strapdown.studio.live_jobs import live_command, live_info
+from strapdown.studio.jobs import ENDED, Jobs
+from strapdown.studio.live_jobs import live_command, live_info, shown_state
 from strapdown.studio.pyramid import StoredStream
 from strapdown.studio.reading_process import ReadingProcess, Refused, told
-from strapdown.studio.samples import listed_samples
+
+# --- events: jobs that changed, lines of live runs, new files ---------------------------
+
+#: Seconds between two looks at the jobs, and looks at jobs between two at the folder.
+EVERY, OF_FOLDER = 0.1, 10
+#: Messages that wait for a client; one that is slower is sent away, and its page asks again.
+WAITING = 500
+#: Longest line of a live run that is passed on, bytes; bytes of lines at once.
+LINE, PART = 8192, 256 << 10
+#: Places of a run at which a page is given a state, and all of the last `PART` of its output.
+KEPT = 2000
+
+
+@dataclass(eq=False)
+class Events:
+    """Sends events to every page that listens.
+
+    Parameters
+    ----------
+    folder : Folder
+    jobs : Jobs
+    """
+
+    folder: Folder
+    jobs: Jobs
+    _clients: set[asyncio.Queue[str | None]] = field(default_factory=set)
+    _read: dict[str, int] = field(default_factory=dict)
+
+    async def serve(self, socket: WebSocket) -> None:
+        """Send events to one page until it goes, or is too slow."""
+        limits = self.folder.limits
+        if len(self._clients) >= limits.sockets:
+            await socket.close(1013)
+            return
+        queue: asyncio.Queue[str | None] = asyncio.Queue(WAITING)
+        # Before the handshake, in which others may come.
+        self._clients.add(queue)
+        listening: asyncio.Task[Any] | None = None
+        try:
+            await socket.accept()
+            listening = asyncio.create_task(_until_closed(socket))
+            await socket.send_text(json.dumps({"jobs": self.jobs.listed()}))
+            while not listening.done():
+                waiting = asyncio.create_task(queue.get())
+                await asyncio.wait({waiting, listening}, return_when=asyncio.FIRST_COMPLETED)
+                if not waiting.done():
+                    waiting.cancel()
+                    return
+                message = waiting.result()
+                if message is None:
+                    await socket.close(1013)
+                    return
+                await asyncio.wait_for(socket.send_text(message), limits.patience)
+        except TimeoutError:
+            with suppress(RuntimeError):
+                await socket.close(1013)
+        finally:
+            self._clients.discard(queue)
+            if listening is not None:
+                listening.cancel()
+
+    async def watch(self) -> None:
+        """Look at jobs and folder, and report what changed."""
+        before = await run_in_threadpool(self.folder.signature)
+        count = 0
+        while True:
+            await asyncio.sleep(EVERY)
+            count += 1
+            for job in await run_in_threadpool(self.jobs.advance):
+                self._tell({"job": job})
+            for line in await run_in_threadpool(self._lines):
+                self._tell(line)
+            if count % OF_FOLDER == 0:
+                now = await run_in_threadpool(self.folder.signature)
+                if now != before:
+                    before = now
+                    self._tell({"files": True})
+
+    def _tell(self, message: dict[str, Any]) -> None:
+        text = json.dumps(message)
+        for queue in self._clients:
+            try:
+                queue.put_nowait(text)
+            except asyncio.QueueFull:
+                # It is sent away after what it has not read.
+                queue.get_nowait()
+                queue.put_nowait(None)
+
+    def _lines(self) -> list[dict[str, Any]]:
+        """New state lines of live runs: lines of JSON in their output."""
+        found: list[dict[str, Any]] = []
+        for job in self.jobs.listed():
+            if job["kind"] != "live" or (job["state"] in ENDED and job["id"] not in self._read):
+                continue
+            with suppress(OSError):
+                found += self._new(job["id"])
+            if job["state"] in ENDED:
+                del self._read[job["id"]]
+        return found
+
+    def _new(self, number: str) -> list[dict[str, Any]]:
+        path = self.jobs.output(number)
+        at, size = self._read.setdefault(number, 0), path.stat().st_size
+        if size < at:
+            at = 0  # the keeper began another file
+        # Of a run that is faster than the page, the latest.
+        at = max(at, size - PART)
+        with path.open("rb") as stream:
+            stream.seek(at)
+            data = stream.read(size - at)
+        whole = data.rfind(b"\n") + 1
+        self._read[number] = at + whole
+        states = with_numbers(_states(data[:whole].splitlines())[-WAITING // 4 :])
+        return [{"line": {"id": number, "data": state}} for state in states]
+
+
+def states_of(folder: Folder, jobs: Jobs, number: str) -> dict[str, Any]:
+    """Return states of a live run from its beginning, and how long its sessions are silent.
+
+    Returns
+    -------
+    dict
+        ``states``: evenly over the output, and each of the last ones; ``silent_s``: by session,
+        seconds since its last message, as the file of its journal says.
+    """
+    job = jobs.shown(number)
+    output = jobs.output(number)
+    lines: list[bytes] = []
+    for path in (output.with_name(output.name + ".before"), output):
+        with suppress(OSError), path.open("rb") as stream:
+            lines += _lines_over(stream, path.stat().st_size, KEPT)
+    states = with_numbers(_states(lines))
+    silent = {}
+    for name in {str(state.get("session", "")) for state in states}:
+        with suppress(ConfigError, OSError):
+            journal = folder.within(f"{job['name']}/{plain_name(name)}") / JOURNAL
+            silent[name] = max(0.0, time.time() - journal.stat().st_mtime)
+    return {"states": states, "silent_s": silent}
+
+
+def _lines_over(stream: BinaryIO, size: int, most: int) -> list[bytes]:
+    """Return whole lines evenly over a file, and all of its last `PART`; the latter if shorter."""
+    found: dict[int, bytes] = {}
+    for k in range(most if size > PART else 0):
+        stream.seek(size * k // most)
+        if k:
+            stream.readline()
+        at = stream.tell()
+        while (line := stream.readline(LINE)) and line[:1] != b"{":
+            at = stream.tell()
+        found[at] = line
+    stream.seek(max(0, size - PART))
+    if size > PART:
+        stream.readline()
+    while stream.tell() < size:
+        found[stream.tell()] = stream.readline(LINE)
+    return [found[at] for at in sorted(found)]
+
+
+def _states(lines: Iterable[bytes]) -> list[dict[str, Any]]:
+    """Return the lines that are states."""
+    found = []
+    for line in lines:
+        if len(line) <= LINE and line[:1] == b"{":
+            with suppress(ValueError):
+                found.append(json.loads(line, parse_constant=lambda _: None))
+    return found
+
+
+def with_numbers(states: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Give the last state of each session its numbers as the page writes them."""
+    for state in {str(one.get("session")): one for one in states}.values():
+        state["shown"] = shown_state(state)
+    return states
+
+
+async def _until_closed(socket: WebSocket) -> None:
+    """Read, and forget, what a page sends until it goes."""
+    while (await socket.receive())["type"] != "websocket.disconnect":
+        pass
+
+
+# --- records to begin with, copied where a person asks for them --------------------------
+
+#: Head of the case of the simulated crash.
+SIMULATED = "A simulated crash: what is marked as yours is the statement of the simulation."
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Records to begin with.
+
+    Attributes
+    ----------
+    title, text : str
+        For people.
+    make : callable
+        Returns the content of each file by its name.
+    """
+
+    title: str
+    text: str
+    make: Callable[[], dict[str, bytes]]
+
+
+def _drive() -> dict[str, bytes]:
+    recording = files("strapdown").joinpath("demo_data", "comma2k19")
+    return {
+        name: recording.joinpath(name).read_bytes()
+        for name in ("imu.csv", "gnss.csv", "reference.csv")
+    }
+
+
+def _crash() -> dict[str, bytes]:
+    from strapdown.api.simulation import simulate
+
+    with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
+        made = Path(name) / "crash"
+        simulate("frontal").save(made)
+        records = sorted(made.glob("imu1_*.csv"))
+        case = (made / "case.toml").read_text(encoding="utf-8")
+        truth = json.loads((made / "scenario.json").read_text(encoding="utf-8"))["impacts"][0]
+        own = {p.name: p.read_bytes() for p in records}
+        return {**own, "case.toml": _case_of_one(case, truth).encode()}
+
+
+def _case_of_one(case: str, truth: Mapping[str, Any]) -> str:
+    """Return a simulated case with its first recorder alone, whose files are in the folder.
+
+    `truth`: of its impact, which the description states.
+    """
+    head, first, *others = case.split("\n[[units]]")
+    # Without the comment above it, and what refers to files that are not copied.
+    head = head[head.index("\ntitle = ") :]
+    options = others[-1][others[-1].index("\n[options]") :]
+    text = f"{head}\n[[units]]{first}{options}"
+    change = math.hypot(*truth["delta_v_m_per_s"]) / KMH
+    said = (
+        f"Simulated, with the statements of an investigator. The truth is a delta-V of {change:.1f}"
+        f" km/h and a direction of force of {truth['pdof_deg']:.1f}\N{DEGREE SIGN}."
+    )
+    text = re.sub("\ndescription = .*", f"\ndescription = {string(said)}", text)
+    return f"# {SIMULATED}\n{text}"
+
+
+SAMPLES = {
+    "drive": Sample(
+        "A phone in a car",
+        "One minute of a recorded drive: inertial sensors, satellite fixes and a reference "
+        "(comma2k19, MIT license).",
+        _drive,
+    ),
+    "crash": Sample(
+        "A simulated crash",
+        "The recorder of a car that meets an obstacle with its front, in three files, and a case "
+        "for them: the answers of the simulation, whose truth is known.",
+        _crash,
+    ),
+}
+
+
+def listed_samples() -> list[dict[str, str]]:
+    """List the samples: name, title and text."""
+    return [{"name": k, "title": one.title, "text": one.text} for k, one in SAMPLES.items()]
+
+
+def sample(folder: Path, name: str) -> dict[str, Any]:
+    """Copy a sample into a folder of its own, in that of the studio; return its records by name.
+
+    A configuration for them is copied, too, and offered where one is proposed.
+
+    ConfigError: there is no such sample, or another file has the name of one of its own.
+    """
+    check_choice("studio.no-such-sample", SAMPLES, quantity="name", word=name)
+    own, made = f"sample-{name}", SAMPLES[name].make()
+    place = Folder(folder).path / own
+    if place.is_symlink() or (place.exists() and not place.is_dir()):
+        raise ConfigError("studio.name-taken", file=own)
+    for file, data in made.items():
+        target = place / file
+        if target.is_symlink() or (target.exists() and target.read_bytes() != data):
+            raise ConfigError("studio.name-taken", file=f"{own}/{file}")
+    place.mkdir(exist_ok=True)
+    for file, data in made.items():
+        replace_file(place / file, data)
+    return {"files": [f"{own}/{file}" for file in made if not file.endswith(".toml")]}
+
 
 # The map of a studio: tiles of a local MBTiles or PMTiles file, each checked before it is sent.
 

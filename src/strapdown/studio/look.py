@@ -99,7 +99,7 @@ def look(
         of the first log.
     """
     from strapdown.report.doctor import diagnosis_json, headline, uses
-    from strapdown.systems.doctor import run_doctor
+    from strapdown.systems.doctor import of_other_file, run_doctor
 
     place = Folder(folder)
     chosen = [place.file(name) for name in names]
@@ -147,6 +147,7 @@ def look(
                 about = {"file": place.name_of(path), "key": own, "name": name, **about}
                 streams.append({**about, **stretches, **listed})
     first = next((k for k, one in enumerate(made.logs) if "imu" in one.streams), 0)
+    waiting = [f for one in made.logs for f in one.faults if of_other_file(one, f)]
     said = diagnosis_json(made, "studio")
     # Names from the folder of the studio, as in streams and questions: two files may be alike.
     said["logs"] = [
@@ -161,7 +162,7 @@ def look(
         "findings": [told(f) for one in made.logs for f in (*one.faults, *one.notes)],
         "questions": [
             *_questions(made.logs, keys),
-            *_heights_of(made.between, by_name),
+            *_heights_of([*made.between, *dict.fromkeys(waiting)], by_name),
         ],
         "streams": streams,
         # For what may be found out with them: with those that may be of a drive.
@@ -398,13 +399,16 @@ def _heights_of(unread: Sequence[Finding], names: Mapping[str, Path]) -> list[di
 
 def _questions(logs: Sequence[Any], keys: Mapping[str, Any]) -> list[dict[str, Any]]:
     """List what the logs leave open, and how the sensor of each is mounted where none says it."""
+    from strapdown.systems.doctor import of_other_file
+
     found = []
     for one in logs:
         name = Path(one.log.path).as_posix()
         columns = of_file(keys, None, name)[0].get("columns", {})
         found += [question_of(f, one.answers, name, columns) for f in one.questions]
         for ask in (heights_question, axes_question):
-            asked = [ask(f, name) for f in (*one.faults, *one.notes)]
+            own = [f for f in (*one.faults, *one.notes) if not of_other_file(one, f)]
+            asked = [ask(f, name) for f in own]
             found += [q for q in asked if q is not None][:1]
     return found
 

@@ -39,7 +39,7 @@ QUESTIONS = {
     "propose": "strapdown.studio.configuration:propose",
     "check": "strapdown.studio.configuration:check",
     "kinds": "strapdown.studio.forms:kinds",
-    "sample": "strapdown.studio.samples:sample",
+    "sample": "strapdown.studio.app:sample",
     "command": "strapdown.studio.configuration:command",
     "run": "strapdown.studio.runs:run",
     "run_stream": "strapdown.studio.runs:run_stream",

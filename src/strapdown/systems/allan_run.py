@@ -24,9 +24,14 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats.aid_table import but_temperature, temperature_of
 from strapdown.formats.recording import Recording
 from strapdown.progress import Progress, silent
-from strapdown.sensors.allan import allan_model, deviations
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, KEYS
-from strapdown.sensors.noise_terms import ChannelNoise, Shapes, pooled_terms
+from strapdown.sensors.noise_terms import (
+    ChannelNoise,
+    Shapes,
+    allan_model,
+    deviations,
+    pooled_terms,
+)
 from strapdown.sensors.rest import find_rest_spans
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors, triad_of
 from strapdown.systems.alignment_source import body_record

@@ -31,10 +31,11 @@ from strapdown.sensors.calibration_stops import CalibrationRecord, KnownRotation
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.magnetometer import (
     LEAST,
+    LEAST_RESTS,
     MagnetometerCalibration,
+    calibrate_by_poses,
     calibrate_magnetometer,
 )
-from strapdown.sensors.magnetometer_poses import LEAST_RESTS, calibrate_by_poses
 from strapdown.sensors.rest import RestStretch, find_rests_of_every_grade
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.alignment_source import body_record

@@ -220,7 +220,7 @@ def run_doctor(spec: DoctorSpec, progress: Progress = silent) -> Diagnosis:
         No file holds anything that can be read.
     """
     logs: list[LogDiagnosis] = []
-    unread: list[DataError] = []
+    unread: list[tuple[str, DataError]] = []
     unfit: dict[str, ConfigError] = {}
     # A file that the record of a crash names as its own is examined with it.
     named: set[Path] = set()
@@ -246,11 +246,11 @@ def run_doctor(spec: DoctorSpec, progress: Progress = silent) -> Diagnosis:
                 logs.append(without)
                 unfit[log.path] = error
         except DataError as error:
-            unread.append(error)
+            unread.append((log.path, error))
     if unfit and len(unfit) == len(by_path):
         raise next(iter(unfit.values()))
     if not logs:
-        raise unread[0]
+        raise unread[0][1]
     alone = [k for k, one in enumerate(logs) if "gnss" in one.streams and "imu" not in one.streams]
     # The positions of a reference are fixes where there are no others.
     alone.sort(key=lambda k: "reference" in logs[k].streams)
@@ -264,10 +264,13 @@ def run_doctor(spec: DoctorSpec, progress: Progress = silent) -> Diagnosis:
             fixes = logs[alone[0]]
             logs[k] = _with_fixes(one, fixes)
             logs[alone[0]] = replace(fixes, data={**fixes.data, "fixes_for": one.name})
-    between = (*(e.finding for e in unread), *_between(logs))
+    lent = _lend_refused_fixes(logs, unread)
+    between = (*(e.finding for _, e in unread if e.finding is not lent), *_between(logs))
     findings = tuple(f for one in logs for f in (*one.questions, *one.faults, *one.notes))
     inputs = tuple(f for x in logs for f in log_files(x.log.path, _files(x), x.log.calibration))
-    read = {x.log.path for x in logs}
+    waiting = [path for path, e in unread if e.finding is lent]
+    inputs += tuple(f for path in waiting for f in log_files(path, files_of(path), None))
+    read = {*(x.log.path for x in logs), *waiting}
     kept = [k for k, log in enumerate(spec.logs) if log.path in read]
     axes = spec.axes if not isinstance(spec.axes, tuple) else tuple(spec.axes[k] for k in kept)
     asked = spec.model_copy(update={"logs": tuple(spec.logs[k] for k in kept), "axes": axes})
@@ -369,6 +372,36 @@ def _diagnose(
         data,
     )
     return _judged(one)
+
+
+def _lend_refused_fixes(
+    logs: list[LogDiagnosis], unread: Sequence[tuple[str, DataError]]
+) -> Finding | None:
+    """Make the question of a file of fixes one of the log that needs them; None if there is none.
+
+    The log is not without fixes: theirs wait for an answer.
+    """
+    needs = [
+        k
+        for k, one in enumerate(logs)
+        if ("imu" in one.streams or one.questions)
+        and "gnss" not in one.streams
+        and refused_fixes(one) is None
+    ]
+    beside = [k for k, one in enumerate(logs) if k not in needs and not one.streams]
+    refused = [f for k in beside if (f := refused_fixes(logs[k])) is not None]
+    refused += [e.finding for _, e in unread if e.finding.data.get("stream") == "gnss"]
+    if not needs or not refused:
+        return None
+    first = refused[0]
+    for k in needs:
+        logs[k] = _judged(replace(logs[k], faults=(first, *logs[k].faults)))
+    for k in beside:
+        if refused_fixes(logs[k]) is first:
+            others = tuple(f for f in logs[k].faults if f not in (first, logs[k].refused))
+            held = {**logs[k].data, "fixes_for": logs[needs[0]].name}
+            logs[k] = _judged(replace(logs[k], faults=others, data=held))
+    return first
 
 
 def _judged(one: LogDiagnosis) -> LogDiagnosis:
@@ -925,6 +958,7 @@ _OPEN = (
     "io.accelerometer-not-read",
     "io.columns-like-accelerometer",
     "io.left-out-unusable",
+    "io.left-out-world-axes",
 )
 
 #: Motion that is missing, and units and axes that contradict gravity or the course.
@@ -936,6 +970,7 @@ _LIMITS = (
     "io.axes-not-stated-z-up",
     "io.axes-upside-down",
     "io.force-scale",
+    "io.gravity-stood-still",
     "io.gyro-axes-differ",
     "io.gyro-axis-in-other-unit",
     "io.gyro-axis-noise-of-other-unit",
@@ -1041,6 +1076,11 @@ def refused_fixes(one: LogDiagnosis) -> Finding | None:
     if "gnss" in one.streams:
         return None
     return next((f for f in one.faults if f.data.get("stream") == "gnss"), None)
+
+
+def of_other_file(one: LogDiagnosis, fault: Finding) -> bool:
+    """Whether a fault of a log is of the file of fixes beside it, which is refused."""
+    return fault.data.get("stream") == "gnss" and fault.file != one.name
 
 
 def _on_clock(gnss: pd.DataFrame, imu: pd.DataFrame) -> tuple[pd.DataFrame, Finding | None]:

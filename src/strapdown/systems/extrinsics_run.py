@@ -12,12 +12,17 @@ import numpy as np
 import pandas as pd
 
 from strapdown.bundle import InputFiles, input_files, log_files
-from strapdown.config.extrinsics import ExtrinsicsSpec
 from strapdown.config.logs import AxesTable
+from strapdown.config.navigation import ExtrinsicsSpec
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.error_model import PHYSICAL
-from strapdown.evaluation.extrinsics import OBSERVED, Estimate, Extrinsics, between_imus
-from strapdown.evaluation.magnetometer_extrinsics import imu_to_magnetometer
+from strapdown.evaluation.extrinsics import (
+    OBSERVED,
+    Estimate,
+    Extrinsics,
+    between_imus,
+    imu_to_magnetometer,
+)
 from strapdown.evaluation.second_log import coarse_offset
 from strapdown.formats import holds
 from strapdown.formats.aid_table import read_aid_table, read_stream

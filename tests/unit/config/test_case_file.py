@@ -67,6 +67,16 @@ def test_files_are_found_from_the_folder_of_the_case(tmp_path, monkeypatch):
     assert all(names_file("path", path) for path in paths)
 
 
+@pytest.mark.parametrize("kind", ["speed_record", "gnss"])
+def test_the_speeds_of_the_wheels_are_found_there_too(tmp_path, kind):
+    (tmp_path / "can.csv").touch()
+    fixes = 'path = "imu2.csv"\nantenna_m = [0.0, 0.0, -1.0]' if kind == "gnss" else ""
+    drive = f'kind = "{kind}"\n{fixes}\nspeed_path = "can.csv"'
+    given = 'speed_km_per_h = 25.2\nspeed_sd_km_per_h = 0.36\nsource = "speed trap"\n'
+    spec = read(tmp_path, ('kind = "speed"', drive), (given, ""))
+    assert spec.entry.speed_path == str(tmp_path / "can.csv")
+
+
 def test_the_nearest_file_can_be_pasted(tmp_path):
     write(tmp_path)
     (tmp_path / "records").mkdir()

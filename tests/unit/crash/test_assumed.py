@@ -19,7 +19,6 @@ from tests.unit.crash.assumed_case import (
     unit_of,
 )
 
-from strapdown.crash.combine_units import combine_units
 from strapdown.crash.consistency import compare_units
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.drive_entry import DriveEntry, start_from_drive
@@ -28,9 +27,10 @@ from strapdown.crash.measuring_point import MISSING_AXIS, NO_TURNING, TURNED_AXI
 from strapdown.crash.path import sample_paths
 from strapdown.crash.preparation import Preparation, prepare_unit
 from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import DataError
 from strapdown.sensors.crash_unit import (
     TURN_SHAPES,
+    TURNS,
     Assumed,
     CrashUnit,
     Mounting,
@@ -38,7 +38,6 @@ from strapdown.sensors.crash_unit import (
     turning_shapes,
 )
 from strapdown.sensors.uncertainty import TriadUncertainty
-from strapdown.sensors.unmeasured import TURNS
 from strapdown.simulation.crash_motion import CRASHES
 from strapdown.simulation.crash_recording import paper_units, record_crash
 from strapdown.tables import NED, VELOCITY
@@ -272,11 +271,6 @@ class TestSeveral:
         assert lines.loc[MISSING_AXIS].max() == pytest.approx(0.0, abs=1e-12)
         # Nothing of what is assumed is told to disagree with what is measured.
         assert found.comparison.agree
-
-    def test_a_median_is_refused(self, straight):
-        units = [path_of(unit_of(straight, 0, "xz", ASSUMED, n))[0] for n in ("A", "B", "C")]
-        with pytest.raises(ConfigError, match="assumed"):
-            combine_units(units, "median")
 
     def test_three_of_them_are_compared(self, straight):
         units = [

@@ -112,6 +112,18 @@ def test_a_range_without_nonlinearity_keeps_its_stated_scale(draw):
     assert kept == pytest.approx(0.02 * felt, rel=0.1)
 
 
+def test_a_speed_may_be_of_the_instant_of_a_fix(draw):
+    # Late by 0.1 s as stated, the means of five stamps are of quarter seconds, fixes of halves.
+    fixes, speeds = draw.fixes.copy(), draw.speeds.copy()
+    for table in (fixes, speeds):
+        table.index = table.index.to_numpy().round(2)
+    together = replace(draw, fixes=fixes, speeds=speeds)
+    _, _, state = case.reconstructed(together, "both", window=16.0)
+    assert max(abs(z) for z, *_ in errors_of(state, draw.truth).values()) < 3.4
+    assert state.fixes["used"].sum() > 20
+    assert state.speeds["used"].sum() > 30
+
+
 def test_speeds_show_the_mounting_and_not_more_than_the_tires(draw):
     _, entry, state = case.reconstructed(draw, "speeds", window=16.0)
     found = errors_of(state, draw.truth)

@@ -22,7 +22,6 @@ from strapdown.crash.structure import unlearnt
 MANUAL = Path(__file__).parents[3] / "docs" / "crash.md"
 #: Of each kind in the slow test, of other crashes than those of the manual.
 DRAWS, SEED, OTHER_SEED = 4, 6000, 6500
-LEVEL = 1e-3
 
 
 def scaled(percent):
@@ -74,11 +73,11 @@ def reported(crash, gyro, errors=tuple(ERRORS)) -> list[bool]:
         pair = there
         if isinstance(wrong, Fault):
             pair = prepared([units[0], crash.unit(1, gyro=gyro, fault=wrong)], options)
-        edges = common_edges(pair, None, 20)
+        edges = common_edges(pair)
         a, b = (velocity_increments(u, edges) for u in pair)
         b = b if isinstance(wrong, Fault) else wrong(b)
         kept = np.ones(len(edges) - 1, dtype=bool)
-        found = compare_pair(*pair, a, b, kept, LEVEL, unlearnt(pair))
+        found = compare_pair(*pair, a, b, kept, unlearnt(pair))
         out.append(not found.agree or any(f.severity != "note" for f in found.findings))
     return out
 

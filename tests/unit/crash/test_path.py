@@ -24,7 +24,7 @@ from strapdown.crash.entry import Entry
 from strapdown.crash.measuring_point import unit_effects
 from strapdown.crash.path import PLACE, VELOCITY, reconstruct_path, sample_paths
 from strapdown.errors import ConfigError, DataError
-from strapdown.report.crash_signals import attitude_chart
+from strapdown.report.crash_document import attitude_chart
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.lever_arm import move_unit
 from strapdown.sensors.pre_crash import Levelling

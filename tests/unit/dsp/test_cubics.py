@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
-from strapdown.dsp.cubics import hermite, spline
+from strapdown.dsp.samples import hermite, spline
 
 # The operations are scipy's, whose compiler may fuse products with sums: a spline's value is some
 # fifty roundings from that.

@@ -16,8 +16,7 @@ from tests.unit.evaluation.made_pairs import (
 import strapdown as sd
 from strapdown import rotation
 from strapdown.errors import DataError
-from strapdown.evaluation.extrinsics import between_imus
-from strapdown.evaluation.magnetometer_extrinsics import imu_to_magnetometer
+from strapdown.evaluation.extrinsics import between_imus, imu_to_magnetometer
 from strapdown.tables import ACCEL, GYRO, MAG, imu_table
 
 

@@ -18,7 +18,7 @@ import strapdown as sd
 from strapdown.config.logs import LogTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError
-from strapdown.formats import csv, read_log
+from strapdown.formats import csv, read_joined, read_log
 from strapdown.formats.recording import ReadOptions
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
@@ -112,6 +112,33 @@ def test_a_minus_before_a_number_or_a_name(tmp_path, columns):
     np.testing.assert_allclose(imu[GYRO], RATES, atol=1e-9)
     read = {r.quantity: r.source for r in recording.readings}
     assert read["gyro_z"] == "-gz"
+
+
+@pytest.mark.parametrize("form", ["a folder", "two files", "rows of each sensor", "last row first"])
+def test_a_minus_in_whatever_way_a_log_is_put_together(tmp_path, form):
+    """The sign is of the column, and counts once."""
+    turned = {"gyro_z": "-gz", "accel_x": "-ax"}
+    frame = table(RATES * [1, 1, -1], BARE)
+    frame["ax"] *= -1.0
+    units = {"gyro_unit": "rad/s", "accel_unit": "m/s2", "time_unit": "s"}
+    path = tmp_path / "log.csv"
+    if form == "last row first":
+        frame[::-1].to_csv(path, index=False)
+    elif form != "rows of each sensor":
+        frame[["t", "gx", "gy", "gz"]].to_csv(tmp_path / "gyro.csv", index=False)
+        frame[["t", "ax", "ay", "az"]].to_csv(tmp_path / "accel.csv", index=False)
+        path = tmp_path
+        if form == "a folder":
+            turned = {"gyro_z": "-gyro.csv/gz", "accel_x": "-accel.csv/ax"}
+    else:
+        gyro, accel = frame.copy(), frame.copy()
+        gyro[BARE[4:]] = accel[BARE[1:4]] = np.nan
+        both = pd.concat([gyro, accel]).sort_values("t", kind="stable")
+        both.to_csv(path, index=False)
+    paths = [path / "gyro.csv", path / "accel.csv"] if form == "two files" else [path]
+    imu = read_joined(paths, ReadOptions(columns=turned, **units)).imu
+    np.testing.assert_allclose(imu[GYRO], RATES, atol=1e-9)
+    np.testing.assert_allclose(imu[ACCEL], FORCE, atol=1e-9)
 
 
 def test_a_column_of_that_name_is_itself():

@@ -571,7 +571,7 @@ def test_a_damaged_track_is_refused(tmp_path, recordings):
     for size in (1500, 4000, len(data) - 3):
         path = tmp_path / "cut.gpx"
         path.write_bytes(data[:size])
-        with pytest.raises(DataError, check=coded("io.gpx-unreadable")):
+        with pytest.raises(DataError, check=coded("io.track-unreadable")):
             open_stream(path, "gnss")
 
 

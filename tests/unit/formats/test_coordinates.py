@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -306,7 +307,87 @@ def test_kml_that_cannot_be_used(tmp_path, text):
     path.write_text(text)
     with pytest.raises(DataError) as refused:
         fixes(path)
-    assert refused.value.finding.code in ("io.kml-unreadable", "io.track-without-time")
+    assert refused.value.finding.code in ("io.track-unreadable", "io.track-without-time")
+
+
+def tcx(kind="Activities", height=True):
+    """Two laps, of which the second begins with the last point of the first; as Garmin has them."""
+
+    def point(k):
+        over = f"<AltitudeMeters>{ALT}</AltitudeMeters>" if height else ""
+        return (
+            f"<Trackpoint><Time>{DATES[k]}</Time><Position><LatitudeDegrees>{LAT[k]:.9f}"
+            f"</LatitudeDegrees><LongitudeDegrees>{LON[k]:.9f}</LongitudeDegrees></Position>{over}"
+            "<HeartRateBpm><Value>120</Value></HeartRateBpm><Extensions><ns3:TPX>"
+            "<ns3:Speed>3.1</ns3:Speed></ns3:TPX></Extensions></Trackpoint>"
+        )
+
+    first, second = ("".join(map(point, r)) for r in (range(10), range(9, COUNT)))
+    inside = "<Trackpoint><Time>2024-03-05T11:59:59Z</Time></Trackpoint>"  # no position yet
+    one = "Activity" if kind == "Activities" else "Course"
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?><TrainingCenterDatabase '
+        'xmlns="http://www.garmin.com/xmlschemas/TrainingCenterDatabase/v2" '
+        'xmlns:ns3="http://www.garmin.com/xmlschemas/ActivityExtension/v2">'
+        f'<{kind}><{one}><Lap StartTime="{DATES[0]}"><Track>{inside}{first}</Track></Lap>'
+        f"<Lap><Track>{second}</Track></Lap></{one}></{kind}></TrainingCenterDatabase>"
+    )
+
+
+def test_laps_of_tcx(tmp_path):
+    path = tmp_path / "activity.tcx"
+    path.write_text(tcx())
+    assert reader_of(path)[0] == "tcx"
+    with pytest.raises(DataError, check=coded("io.height-level-not-stated")):
+        fixes(path)
+    as_read(fixes(path, datum_height_m=0.0))
+    path.write_text(tcx(height=False))
+    with pytest.raises(DataError, check=coded("io.fixes-without-height")):
+        fixes(path)
+    # The times of a planned course are not measured.
+    path.write_text(tcx("Courses"))
+    with pytest.raises(DataError, check=coded("io.track-without-time")):
+        fixes(path, datum_height_m=0.0)
+    path.write_text(tcx()[:-30])
+    with pytest.raises(DataError, check=coded("io.track-unreadable", title="TCX")):
+        fixes(path)
+
+
+@pytest.mark.parametrize(
+    ("level", "code"),
+    [("HFALGALTGPS:ELL", ""), ("HFALGALTGPS:GEO", "io.height-over-sea-column"), ("", "open")],
+)
+def test_a_flight_recorder(tmp_path, level, code):
+    """Across midnight, with a fix of which the receiver has no altitude."""
+
+    def row(at, lat, lon, valid="A"):
+        minutes = [round(60e3 * abs(v)) for v in (lat, lon)]
+        places = f"{minutes[0] // 60000:02d}{minutes[0] % 60000:05d}{'NS'[lat < 0]}"
+        places += f"{minutes[1] // 60000:03d}{minutes[1] % 60000:05d}{'EW'[lon < 0]}"
+        return f"B{at}{places}{valid}00480{520 if valid == 'A' else 0:05d}009"
+
+    rows = ["AXYZABC", "HFDTEDATE:050324,01", "HFFXA035", *([level] if level else [])]
+    rows += [row("235958", -48.25, -11.5), row("235959", -48.25, -11.5, "V")]
+    rows += [row("000000", -48.250100, -11.500050), "LXYZ a comment", row("000001", -48.25, -11.5)]
+    path = tmp_path / "flight.igc"
+    path.write_text("\r\n".join(rows) + "\r\n")
+    assert reader_of(path)[0] == "igc"
+    stated = {} if level.endswith("ELL") else {"datum_height_m": 0.0}
+    if stated:
+        code = "io.height-level-not-stated" if code == "open" else code
+        with pytest.raises(DataError, check=coded(code)):
+            fixes(path)
+    got = fixes(path, **stated)
+    noon = datetime(2024, 3, 5, 23, 59, 58, tzinfo=UTC).timestamp()
+    np.testing.assert_array_equal(got.index, noon + np.array([0.0, 2.0, 3.0]))
+    # A thousandth of a minute.
+    np.testing.assert_allclose(got["lat"], [-48.25, -48.2501, -48.25], rtol=0, atol=0.5 / 60e3)
+    np.testing.assert_allclose(got["lon"], [-11.5, -11.50005, -11.5], rtol=0, atol=0.5 / 60e3)
+    np.testing.assert_array_equal(got["alt"], 520.0)
+    assert "io.fixes-without-position-left-out" in [f.code for f in got.findings]
+    path.write_text("\n".join(rows).replace("050324", "990324"))
+    with pytest.raises(DataError, check=coded("io.track-time-no-date")):
+        fixes(path, **stated)
 
 
 def feature(kind, where, **properties):

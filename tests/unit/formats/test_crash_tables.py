@@ -57,6 +57,13 @@ def read(tmp_path):
         ("upward acceleration up (m/s^2)", "acceleration", "-z", "m/s2"),
         ("temperature [C]", "other", "", "C"),
         ("column 3", "other", "", ""),
+        # Channel codes of ISO MME; what an occupant's head does is not of the vehicle.
+        ("10VEHCCG0000ACXD", "acceleration", "x", ""),
+        ("10vehccg0000avzd [deg/s]", "rate", "z", "deg/s"),
+        ("10VEHCCG0000ACYC (g)", "acceleration", "y", "g"),
+        ("10VEHCCG0000AC1D", "acceleration", "", ""),
+        ("11HEAD0000H3ACXA", "other", "x", ""),
+        ("10VEHCCG0000QQXD", "other", "", ""),
         # The unit is of one quantity alone: it decides.
         ("gx [g]", "acceleration", "x", "g"),
     ],

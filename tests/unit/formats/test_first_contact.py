@@ -24,6 +24,7 @@ from strapdown.errors import DataError
 from strapdown.formats import printed_lines, reader_of
 from strapdown.formats.arrays import nanoseconds_of
 from strapdown.formats.columns import read_name
+from strapdown.formats.csv import of_arrays
 from strapdown.formats.find_columns import rates_and_force
 from strapdown.formats.novatel import SCALES
 from strapdown.formats.printed_lines import as_rows
@@ -937,3 +938,190 @@ def test_names_that_may_be_of_rates_are_listed(tmp_path, name):
     names = ["time_s", *of("acc", "_mss"), *(name.format(a) for a in "abc")]
     with pytest.raises(DataError, check=coded("io.no-gyro-columns")):
         sd.read_imu(tabled(tmp_path, names, [T, FORCE, RATE]))
+
+
+# Layouts that were met on a further round.
+
+
+@pytest.mark.parametrize("form", ["letters", "numbers"])
+def test_a_folder_of_tables_of_a_camera(tmp_path, form, run_cli):
+    """gopro-telemetry (toCsv, deduceHeaders): a table a stream, its name and unit in each heading.
+
+    Where the camera names no axes, the first value has the name, and the others are numbered.
+    """
+
+    def table(stream, name, unit, values):
+        bare = f"{name} [{unit}],1,2"
+        heads = ",".join(f"{name} ({a}) [{unit}]" for a in "zxy") if form == "letters" else bare
+        rows = [f"cts,date,{heads},temperature [°C]"]
+        for k in range(N):
+            order = values[k][[2, 0, 1]] if form == "letters" else values[k]
+            stamp = (DAY + timedelta(seconds=float(T[k]))).isoformat(timespec="milliseconds")
+            stamp = stamp.replace("+00:00", "Z")
+            rows.append(line(1e3 * T[k] + 35.5, stamp, *many(order), "25.3"))
+        written(tmp_path, f"GH010042_HERO9 Black-{stream}.csv", rows)
+
+    table("ACCL", "Accelerometer", "m/s2", FORCE)
+    table("GYRO", "Gyroscope", "rad/s", RATE)
+    heads = "cts,date,GPS (Lat.) [deg],GPS (Long.) [deg],GPS (Alt.) [m],GPS (2D speed) [m/s]"
+    rows = [f"{heads},GPS (3D speed) [m/s],fix,precision,altitude system"]
+    for k in range(15):
+        stamp = (DAY + timedelta(seconds=k)).isoformat().replace("+00:00", ".000Z")
+        rows.append(line(1e3 * k, stamp, LAT[k], LON[k], 520.25, 1.5, 1.6, 3, 120, "MSLV"))
+    gps = written(tmp_path, "GH010042_HERO9 Black-GPS5.csv", rows)
+    imu = sd.read_imu(tmp_path)
+    check(imu, start=DAY.timestamp())
+    assert not {f.code for f in imu.findings} & {"io.tables-not-used"}
+    for path in (tmp_path, gps):
+        fixes = sd.read_gnss(path, position_sd_m=5.0)
+        np.testing.assert_allclose(fixes[["lat", "lon"]], np.column_stack([LAT, LON])[:15])
+        np.testing.assert_array_equal(fixes["alt"], 520.25)
+        np.testing.assert_allclose(np.diff(fixes.index), 1.0)
+    done = run_cli("init", "navigate", tmp_path, "--out", tmp_path / "drive.toml")
+    assert "15 of 15 fixes" in done.out + done.err
+
+
+@pytest.mark.parametrize(
+    ("names", "read"),
+    [
+        (["Gyro [deg/s]", "1", "2"], ["gyro_x", "gyro_y", "gyro_z"]),
+        (["CameraOrientation", "1", "2", "3"], [None, None, None, None]),
+        (["Gyro", "1", "2", "3"], ["gyro", None, None, None]),
+        (["count", "1", "2"], [None, None, None]),
+    ],
+)
+def test_values_of_which_the_first_has_the_name(names, read):
+    assert [read_name(name).quantity for name in of_arrays(names)] == read
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "unit"),
+    [
+        ("GPS (Lat.) [deg]", "lat", "deg"),
+        ("GPS (Long.) [deg]", "lon", "deg"),
+        ("GPS (2D speed) [m/s]", "speed", "m/s"),
+        ("GPS (3D speed) [m/s]", None, "m/s"),
+        ("Altitude (AGL) [m]", None, "m"),
+        ("Speed (OBD)(km/h)", None, "km/h"),
+    ],
+)
+def test_words_in_brackets_before_a_unit(name, quantity, unit):
+    said = read_name(name, FIXES)
+    assert (said.quantity, said.unit) == (quantity, unit)
+
+
+def test_names_between_tabs_over_rows_between_commas(tmp_path):
+    """Sketches for the Nano 33 BLE print both, below what the library says of its sensor."""
+    top = ["Started", "Gyroscope sample rate = 100.00 Hz", "", "Gyroscope in degrees/second"]
+    rows = [*top, "aX\taY\taZ\tgX\tgY\tgZ"]
+    rows += [line(*many(FORCE[k] / STANDARD_GRAVITY), *many(RATE[k] * DEG)) for k in range(N)]
+    imu = sd.read_imu(written(tmp_path, "nano.txt", rows))
+    check(imu)
+
+
+def of_world(rng, tilt, time=T):
+    """Rates in rad/s, attitude to axes of the world (w first), and forces in both."""
+    u = np.maximum(time - 3.0, 0.0)
+    angles = [0.9 * np.sin(0.5 * u), tilt * np.sin(0.7 * u) ** 3, tilt * np.sin(0.9 * u) ** 3]
+    turn = Rotation.from_euler("ZYX", np.column_stack(angles))
+    rate = np.vstack([(turn[:-1].inv() * turn[1:]).as_rotvec() / STEP, np.zeros(3)])
+    world = 0.5 * np.sin(np.outer(u, [1.1, 2.2, 3.3])) + [0.0, 0.0, STANDARD_GRAVITY]
+    world += rng.normal(0.0, 0.01, world.shape)
+    q = turn.as_quat()[:, [3, 0, 1, 2]]
+    return rate + rng.normal(0.0, 1e-3, rate.shape), q, turn.inv().apply(world), world
+
+
+@pytest.mark.parametrize("way", ["to the world", "from the world"])
+@pytest.mark.parametrize("tilt", [0.2, 1.2])
+def test_an_acceleration_in_axes_of_the_world_beside_a_quaternion(tmp_path, way, tilt):
+    """Applications turn it by the attitude: with gravity in it, it looks like a specific force."""
+    rate, q, body, world = of_world(np.random.default_rng(4), tilt)
+    q = q if way == "to the world" else q * [1.0, -1.0, -1.0, -1.0]
+    names = "time_s,gx_dps,gy_dps,gz_dps,ax_m_s2,ay_m_s2,az_m_s2,qw,qx,qy,qz"
+    for force, left_out in ((world, True), (body, False)):
+        rows = [names]
+        for k in range(N):
+            rows.append(line(*many([T[k]]), *many(rate[k] * DEG), *many(force[k]), *many(q[k])))
+        imu = sd.read_imu(written(tmp_path, "log.csv", rows))
+        assert ("accel_x" not in imu) == left_out
+        found = [f for f in imu.findings if f.code == "io.left-out-world-axes"]
+        assert len(found) == left_out
+        np.testing.assert_allclose(imu[GYRO], rate, atol=1e-6)
+
+
+@pytest.mark.parametrize("motion", ["roundabout", "banked"])
+def test_a_steady_force_of_a_body_in_a_turn(tmp_path, motion):
+    """Across the axis of the turn it is steady as it stands; banked it looks as if of the world."""
+    heading = 0.5 * T
+    bank = 0.5 * np.sin(0.25 * heading) if motion == "banked" else 0.0 * T
+    turn = Rotation.from_euler("ZYX", np.column_stack([heading, 0.0 * T, bank]))
+    rate = np.vstack([(turn[:-1].inv() * turn[1:]).as_rotvec() / STEP, np.zeros(3)])
+    across = 3.0 if motion == "roundabout" else 0.0
+    force = np.column_stack([0.0 * T, across + 0.0 * T, -STANDARD_GRAVITY / np.cos(bank)])
+    force += np.random.default_rng(2).normal(0.0, 0.05, force.shape)
+    q = turn.as_quat()[:, [3, 0, 1, 2]]
+    rows = ["time_s,gx_dps,gy_dps,gz_dps,ax_m_s2,ay_m_s2,az_m_s2,qw,qx,qy,qz"]
+    for k in range(N):
+        rows.append(line(*many([T[k]]), *many(rate[k] * DEG), *many(force[k]), *many(q[k])))
+    path = written(tmp_path, "log.csv", rows)
+    assert ("accel_x" in sd.read_imu(path)) == (motion == "roundabout")
+    imu = sd.read_imu(path, columns={"accel": "a"})
+    np.testing.assert_allclose(imu[ACCEL], force, atol=1e-5)
+
+
+def test_a_force_that_stands_still_where_the_gyro_turns(tmp_path):
+    time = STEP * np.arange(4 * N)
+    rate, _, body, world = of_world(np.random.default_rng(4), 1.2, time)
+    names = "time_s,gx_dps,gy_dps,gz_dps,ax_m_s2,ay_m_s2,az_m_s2"
+    for force, still in ((world, True), (body, False)):
+        rows = [names]
+        for k in range(len(time)):
+            rows.append(line(*many([time[k]]), *many(rate[k] * DEG), *many(force[k])))
+        imu = sd.read_imu(written(tmp_path, "log.csv", rows))
+        assert [f.quantity for f in imu.findings if f.code == "io.gravity-stood-still"] == (
+            ["accel"] * still
+        )
+
+
+def test_fixes_that_are_held_beside_an_accelerometer_alone(tmp_path):
+    """TrackAddict: a row a sample, each with the last fix again."""
+    heads = "Time,UTC Time,Latitude,Longitude,Altitude (m),Altitude (ft),Speed (Km/h),Speed (MPH)"
+    rows = ["# RaceRender Data: TrackAddict 4.7.0", f"{heads},Heading,Accel X,Accel Y,Accel Z"]
+    for k in range(N):
+        last = k // 100
+        fix = [f"{LAT[last]:.7f}", f"{LON[last]:.7f}", 520.0, 1706.0, 10.8 + last, 6.711, 45.0]
+        clocks = [f"{T[k]:.3f}", f"{DAY.timestamp() + T[k]:.3f}"]
+        rows.append(line(*clocks, *fix, *many(FORCE[k] / STANDARD_GRAVITY, 3)))
+    stated = {"position_sd_m": 3.0, "velocity_sd_m_per_s": 1.0}
+    path = written(tmp_path, "log.csv", rows)
+    got = sd.read_gnss(path, columns={"time": "UTC Time"}, **stated)
+    assert got.attrs["clock"] == "unix"
+    np.testing.assert_allclose(
+        got.index + got.attrs["clock_origin"], DAY.timestamp() + np.arange(15)
+    )
+    np.testing.assert_allclose(got["lat"], LAT[:15], atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity"),
+    [("session_gyro.csv", "gyro_x"), ("Polar_ACC.txt", "accel_x"), ("walk.csv", None)],
+)
+def test_a_table_of_one_sensor_that_its_name_says(tmp_path, name, quantity):
+    rows = ["timestamp [ms],x,y,z"]
+    rows += [line(1000 * T[k], *many(RATE[k] * DEG)) for k in range(N)]
+    path = written(tmp_path, name, rows)
+    if quantity == "gyro_x":
+        imu = sd.read_imu(path, units={"gyro": "deg/s"})
+        np.testing.assert_allclose(imu[GYRO], RATE, atol=1e-6)
+        return
+    code = "io.accelerometer-alone" if quantity else "io.no-gyro-columns"
+    with pytest.raises(DataError, check=coded(code)):
+        sd.read_imu(path)
+
+
+def test_a_quaternion_among_columns_without_names_is_no_force():
+    """Three of its four parts had the norm of gravity in g, and turned."""
+    q = TURN.as_quat()
+    columns = [T, *q.T, *TURN.as_euler("xyz").T, *RATE.T, *FORCE.T]
+    assert rates_and_force(columns) == (8, 11)
+    assert rates_and_force([*q.T, *RATE.T]) is None

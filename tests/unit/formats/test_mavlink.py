@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import importlib
+import json
 import struct
 
 import numpy as np
+import pandas as pd
 import pytest
 from tests.coded import coded
 
 from strapdown.errors import DataError
-from strapdown.formats import NoStreamError, ardupilot, open_stream, read_log, readers_of
+from strapdown.formats import NoStreamError, ardupilot, open_stream, read_log, reader_of, readers_of
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.parsers import in_place
@@ -165,6 +167,88 @@ def test_the_ground_station_and_damage(tmp_path, dialect):
     said = [f.code for f in raw.findings]
     assert said == ["io.mavlink-one-of-systems", "io.mavlink-frames-left-out"]
     assert raw.findings[0].data["system"] == 1
+
+
+def printed(form, messages):
+    """Messages as mavlogdump of pymavlink prints them, by the texts of pymavlink."""
+    if form == "text":
+        return [
+            f"2023-11-14 22:13:{20 + at // 1000}.{at % 1000 // 10:02d}: {m}" for at, m in messages
+        ]
+    if form == "json":
+        return [
+            json.dumps(
+                {
+                    "meta": {"type": m.get_type(), "timestamp": T0 / 1e6 + at / 1e3},
+                    "data": {n: v for n, v in m.to_dict().items() if n != "mavpackettype"},
+                }
+            )
+            for at, m in messages
+        ]
+    kinds = {m.get_type(): m.fieldnames for _, m in messages}
+    rows = ["timestamp," + ",".join(f"{k}.{n}" for k, names in kinds.items() for n in names)]
+    for at, m in messages:
+        cells = (
+            str(getattr(m, n)) if k == m.get_type() else "" for k, f in kinds.items() for n in f
+        )
+        rows.append(f"{T0 / 1e6 + at / 1e3:.8f},{','.join(cells)}")
+    return rows
+
+
+@pytest.mark.parametrize("form", ["text", "json", "csv"])
+@pytest.mark.parametrize("scaled", [True, False])
+def test_messages_as_mavlogdump_prints_them(tmp_path, dialect, form, scaled):
+    messages = flight(dialect, 60, scaled=scaled)
+    # Another kind of message, with an array, a text and a comma in it.
+    messages.insert(0, (0, dialect.MAVLink_statustext_message(6, b"EKF3, ready {1 : 2}")))
+    if form == "csv":
+        messages = messages[1:]
+    path = tmp_path / f"flight.{form}"
+    path.write_text("\n".join(printed(form, messages)) + "\n")
+    assert reader_of(path)[0] == "mavlogdump"
+    whole = tlog(tmp_path / "flight.tlog", dialect, messages)
+    pd.testing.assert_frame_equal(read_log(path).imu, read_log(whole).imu)
+    pd.testing.assert_frame_equal(read_gnss(path), read_gnss(whole))
+    pd.testing.assert_frame_equal(read_trajectory(path), read_trajectory(whole))
+    np.testing.assert_array_equal(open_stream(path, "barometer").columns["pressure"], 954.5)
+    assert [f.code for f in read_log(path).findings] == [f.code for f in read_log(whole).findings]
+
+
+@pytest.mark.parametrize("form", ["text", "json"])
+def test_records_of_dataflash_as_mavlogdump_prints_them(tmp_path, form):
+    """Positions of the autopilot's own solution, and of its commands, are no fixes."""
+    rows = []
+    for k in range(40):
+        us = 1_000_000 + 20_000 * k
+        imu = dict(zip(("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ"), IMU_ROW, strict=True))
+        rows.append(("IMU", {"TimeUS": us, **imu, "T": 40.5 + k}))
+        if k % 10 == 0:
+            place = {"Lat": 47.0 + 1e-6 * k, "Lng": 8.5, "Alt": 500.0 + k}
+            gps = {"Status": 3, "NSats": 9, **place, "Spd": 10.0, "GCrs": 90.0, "VZ": -0.5}
+            rows.append(("GPS", {"TimeUS": us, **gps}))
+            rows.append(("POS", {"TimeUS": us, "Lat": 47.1, "Lng": 8.6, "Alt": 1.0}))
+            rows.append(("CMD", {"TimeUS": us, "Lat": 0.0, "Lng": 0.0, "Alt": 0.0}))
+    path = tmp_path / "flight.txt"
+    if form == "text":
+        said = [
+            f"2017-10-29 01:47:09.86: {kind} {{{', '.join(f'{n} : {v}' for n, v in one.items())}}}"
+            for kind, one in rows
+        ]
+    else:
+        said = [json.dumps({"meta": {"type": k, "timestamp": 1.5e9}, "data": v}) for k, v in rows]
+    path.write_text("\n".join(said) + "\n")
+    assert reader_of(path)[0] == "dataflash"
+    imu = read_log(path).imu
+    assert len(imu) == 40
+    np.testing.assert_array_equal(imu.iloc[7, :6], IMU_ROW)
+    fixes = read_gnss(path, GnssOptions(position_sd=3.0, velocity_sd=1.0, datum_height=0.0))
+    np.testing.assert_array_equal(fixes["lat"], 47.0 + 1e-6 * np.arange(0, 40, 10))
+    np.testing.assert_array_equal(fixes["alt"], 500.0 + np.arange(0, 40, 10))
+    np.testing.assert_allclose(fixes[["VN", "VE", "VD"]].iloc[0], [0.0, 10.0, -0.5], atol=1e-12)
+
+
+#: Rates in rad/s and specific force in m/s².
+IMU_ROW = [0.125, -0.25, 0.5, 0.1, -0.2, -9.75]
 
 
 def test_what_is_not_in_it(tmp_path, dialect):

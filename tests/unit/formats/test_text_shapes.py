@@ -10,8 +10,8 @@ from strapdown.errors import DataError
 from strapdown.formats import csv, read_log, read_raw, text_columns
 from strapdown.formats.arrays import epoch_of, nanoseconds_of, nanoseconds_of_epoch
 from strapdown.formats.clocks import counted
+from strapdown.formats.csv import stated_rate, stated_units
 from strapdown.formats.recording import ReadOptions
-from strapdown.formats.table_top import stated_rate, stated_units
 from strapdown.formats.text_columns import BLOCK, columns_at_once
 from strapdown.tables import ACCEL, GYRO
 

@@ -9,9 +9,8 @@ from tests.unit.live.test_reception import fix, lines, received, sample, table
 
 from strapdown.config.navigation import NavigationSpec
 from strapdown.formats.stamp_gate import StampGate
-from strapdown.live.gate import FAMILY, ValueLimits, value_limits
 from strapdown.live.lines import BadLineError, Sample, Word, check_token, parse_line
-from strapdown.live.reception import CONFIRM, ROWS_WAITING
+from strapdown.live.reception import CONFIRM, FAMILY, ROWS_WAITING, ValueLimits, value_limits
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 
 

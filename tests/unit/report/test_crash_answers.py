@@ -39,6 +39,7 @@ from strapdown.report.crash_words import (
     lead,
     limitations,
     not_shown,
+    sentences,
 )
 from strapdown.report.document import Items
 from strapdown.report.values import mass_words, shown_in, spaced
@@ -104,6 +105,11 @@ def with_change(result, **changes):
     """The result with another change of velocity of its event."""
     (body,) = result.reconstruction.main.body
     return with_main(result, body=(replace(body, event=replace(body.event, **changes)),))
+
+
+def test_what_makes_an_answer_wrong_has_its_sentences():
+    # Of an assumed axis they are put together from what the case assumes.
+    assert GRAVE - {"assumed"} <= sentences()["limitations"].keys()
 
 
 def test_an_event_that_is_cut_by_the_record(result):

@@ -22,12 +22,12 @@ from strapdown.report.crash_charts import (
     delta_v_half_widths,
     risk_chart,
 )
-from strapdown.report.crash_outline import event_marks, marks_apart, path_moments
-from strapdown.report.crash_signals import (
+from strapdown.report.crash_document import (
     attitude_chart,
     flags_in_vehicle_axes,
     in_vehicle_axes,
 )
+from strapdown.report.crash_outline import event_marks, marks_apart, path_moments
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.tables import EULER, NED, on_disk
 

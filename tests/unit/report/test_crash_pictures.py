@@ -17,7 +17,6 @@ from tests.unit.report.crash_results import HOSTILE, crash_case, figures_in, fig
 from strapdown import rotation
 from strapdown.config.crash_case import PointSpec, VehicleSpec
 from strapdown.crash.pdof import AngleInterval
-from strapdown.report.crash_animation import MOST_FRAMES, path_animation, vehicle_body
 from strapdown.report.crash_document import _points, crash_document, reference_in_path_axes
 from strapdown.report.crash_outline import (
     angle_words,
@@ -34,7 +33,13 @@ from strapdown.report.crash_pictures import (
     pdof_dial,
     points_picture,
 )
-from strapdown.report.crash_plan import PlanFrame, path_plan
+from strapdown.report.crash_plan import (
+    MOST_FRAMES,
+    PlanFrame,
+    path_animation,
+    path_plan,
+    vehicle_body,
+)
 from strapdown.report.plan import ellipse, envelope, hull
 from strapdown.report.svg_drawing import (
     SMALL,

@@ -162,26 +162,6 @@ def test_a_heading_is_broken_as_little_as_can_be(heading, words):
     assert f"heading {words}, clockwise from north" in chart.caption
 
 
-def test_a_second_one_lies_over_the_first_in_its_frame():
-    first, second = trajectory(leg(300.0, 400.0)), trajectory(leg(310.0, 400.0))
-    second["lon"] += 0.001  # 62.8 m here
-    chart = trajectory_chart(first, second, title="t", names=("truth", "estimate"))
-    for panel in chart.panels:
-        names = [one.name for one in panel.lines if one.legend]
-        assert names == ["truth", "estimate"]
-    estimate = line(chart.panels[0], "estimate")
-    assert estimate.x[0] == pytest.approx(62.8, abs=0.1)
-    assert estimate.colour != line(chart.panels[0], "truth").colour
-    assert estimate.dash != line(chart.panels[0], "truth").dash
-    # One alone needs no legend.
-    assert not any(one.legend for p in trajectory_chart(first, title="t").panels for one in p.lines)
-
-
-def test_a_second_one_that_drifts_has_a_plan_though_the_first_stays():
-    chart = trajectory_chart(trajectory(np.zeros((101, 3))), trajectory(leg(5.0, 2.0)), title="t")
-    assert chart.panels[0].x_label
-
-
 def test_a_long_one_is_thinned_and_says_so():
     turn = np.linspace(0.0, 40.0, 20_000)
     ned = np.column_stack([900 * np.sin(turn), 500 * np.sin(1.3 * turn), 0 * turn])

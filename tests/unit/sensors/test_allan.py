@@ -11,13 +11,15 @@ from scipy.integrate import quad
 from strapdown._kernels.allan import CHUNK, overlapping_variances
 from strapdown._kernels.compilation import interpreted
 from strapdown.errors import DataError
-from strapdown.sensors.allan import (
+from strapdown.sensors.error_chain import apply
+from strapdown.sensors.noise_terms import (
     allan_model,
     block_covariance,
     deviations,
+    levels_of,
+    noise_terms,
+    pooled_terms,
 )
-from strapdown.sensors.error_chain import apply
-from strapdown.sensors.noise_terms import levels_of, noise_terms, pooled_terms
 from strapdown.sensors.triad_errors import TriadErrors
 
 # allantools 2024.06: oadev, mdev and ohdev of `series()` with rate=100.0, data_type="freq" and

@@ -16,19 +16,17 @@ from strapdown.sensors.crash_unit import (
     CrashUnit,
     Mounting,
     RecordedTriad,
-    assumed_shapes,
-    turning_shapes,
-)
-from strapdown.sensors.synchronise import synchronise
-from strapdown.sensors.uncertainty import TriadUncertainty
-from strapdown.sensors.unmeasured import (
     assumed_findings,
+    assumed_shapes,
     axis_names,
+    turning_shapes,
     unmeasured_axes,
     unmeasured_turns,
     with_filled_axes,
     with_gyro,
 )
+from strapdown.sensors.synchronise import synchronise
+from strapdown.sensors.uncertainty import TriadUncertainty
 
 TOLD = TriadUncertainty(
     noise_density=0.01, bias=1.0, scale=0.01, misalignment=0.02, full_scale=500.0, quantization=0.1

@@ -28,8 +28,7 @@ import strapdown as sd
 from strapdown import rotation
 from strapdown.formats import csv
 from strapdown.sensors.calibration import SensorCalibration
-from strapdown.sensors.magnetometer import SHAPES
-from strapdown.sensors.magnetometer_poses import ROTATION_PRIOR, calibrate_by_poses
+from strapdown.sensors.magnetometer import ROTATION_PRIOR, SHAPES, calibrate_by_poses
 
 #: Field, µT: 63° of dip, in a frame with z up; noise of a reading; change from pose to pose.
 FIELD = 48.0 * np.array([math.cos(63.0 * DEG), 0.0, -math.sin(63.0 * DEG)])

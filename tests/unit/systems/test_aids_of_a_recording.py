@@ -26,8 +26,7 @@ from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.systems import navigation_draft
-from strapdown.systems.aid_proposal import propose_aids, propose_magnetometer
-from strapdown.systems.navigation_draft import draft_navigation
+from strapdown.systems.navigation_draft import draft_navigation, propose_aids, propose_magnetometer
 from strapdown.systems.navigation_proposal import propose
 from strapdown.systems.navigation_run import run_navigation
 from strapdown.systems.navigation_source import read_aid

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from strapdown.constants import Array
 from strapdown.errors import DataError
-from strapdown.formats.arrays import numbers, ticks_of
-from strapdown.formats.find_columns import AXES, Column, find_columns, with_reversed
+from strapdown.formats.arrays import ticks_of
+from strapdown.formats.find_columns import AXES, Column, find_columns
 from strapdown.formats.inference.conclusion import (
     Inference,
     Steps,
@@ -68,7 +68,7 @@ def infer(raw: RawLog, options: ReadOptions | None = None) -> tuple[Inference, .
     numbers for. ConfigError: an option names a column that the log does not have. DataError: a
     value or a stamp is not a number.
     """
-    raw, options = with_reversed(raw, options or ReadOptions())
+    options = options or ReadOptions()
     found = find_columns(raw, options)
     stamps, unit = None, None
     if "time" in found:
@@ -85,7 +85,7 @@ def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array | None:
     if not all(c in found for c in columns):
         return None
     try:
-        parts = [numbers(raw, found[c].source, c).astype(np.float64) for c in columns]
+        parts = [found[c].values(raw, c).astype(np.float64) for c in columns]
     except DataError:
         if triad == "gyro":
             raise

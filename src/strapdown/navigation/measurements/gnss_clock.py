@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown._kernels import piecewise
-from strapdown.dsp.cubics import spline
+from strapdown.dsp.samples import spline
 from strapdown.errors import DataError, Finding
 from strapdown.frames import place_difference
 from strapdown.navigation.measurements.gnss_course import LEAST_STEPS, courses, integrals
