@@ -438,14 +438,14 @@ export function suffices(kind: Kind, look: Look): { answer: string; reasons: Fin
   const longest = look.rests.length ? Math.max(...look.rests.map(([a, b]) => b - a)) : 0;
   const say = (answer: string, text: string) => ({ answer, reasons: [{ code: "studio.rests", severity: "note", text }] });
   const rest = longest ? `the longest rest is ${duration(longest)}` : "no rest was found";
-  if (kind.kind === "align") return say(longest > 0 ? "with limits" : "no", `${rest}; roll and pitch by any accelerometer, a heading only by gyros that feel the rotation of the Earth, not by those of a phone: state it for these`);
+  if (kind.kind === "align") return say(longest > 0 ? "with limits" : "no", `${rest}; at rest accelerometers show roll and pitch, and gyros that measure the rotation of the Earth the heading: state it for others, such as those of a phone`);
   // A rest is a pose; which way up it was, and how fast a turn was, a log alone does not say.
   if (kind.kind === "calibrate") {
     const gyro = look.logs.some((log) => log.read_as.some((one) => /^-?gyro/.test(one.quantity)));
-    const poses = look.rests.length ? `${look.rests.length === 1 ? "one rest was" : `${look.rests.length} rests were`} found, each a pose at most; whether their attitudes differ enough, and what each was, is not known` : "no rest was found, and a pose is one";
-    return say(look.rests.length ? "not known" : "no", gyro ? `${poses}; a gyro is there` : `${poses}; no gyro was read, so biases and scales of the accelerometer alone`);
+    const poses = look.rests.length ? `${look.rests.length === 1 ? "one rest was" : `${look.rests.length} rests were`} found, each a pose at most; whether their attitudes differ enough, and what each was, is not known` : "no rest was found, and each pose of a calibration is one";
+    return say(look.rests.length ? "not known" : "no", gyro ? `${poses}; a gyro was read` : `${poses}; no gyro was read, so biases and scales of the accelerometer alone`);
   }
-  if (kind.kind === "allan") return say(longest >= 3600 ? "yes" : longest >= 300 ? "with limits" : "no", `${rest}; an hour is better than a minute`);
+  if (kind.kind === "allan") return say(longest >= 3600 ? "yes" : longest >= 300 ? "with limits" : "no", `${rest}; the white noise takes minutes, the bias instability an hour or more`);
   return null;
 }
 
@@ -481,7 +481,7 @@ export function ChoosePage() {
         return <li key={kind.kind}>
           <h2>{kind.title}</h2>
           <p>{kind.what}</p>
-          <p class="soft">It needs: {kind.needs}</p>
+          <p class="soft">It needs {kind.needs}</p>
           {answer && <p class={`verdict ${answer.look}`}>{answer.words}</p>}
           {fit && fit.reasons.length > 0 && <More title="Why"><Findings findings={fit.reasons} /></More>}
           <button type="button" class={fit && fit.answer === best ? "main" : ""} onClick={() => choose(kind.kind)}>{kind.title}</button>

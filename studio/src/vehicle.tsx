@@ -77,6 +77,9 @@ function View({ title, dots, axes, box, onMove, chosen, onChoose, children }: {
   };
   // Those that are not stated stand beside the origin, none under another.
   const unset = (dot: Dot): Point => [0, 0.35 * (1 + dots.filter((one) => one.value === null).indexOf(dot)), 0];
+  // Of two the lower has its name below it, so that neither name covers the other.
+  const down = (dot: Dot) => (dot.value ?? unset(dot))[axes[1]]!;
+  const lower = dots.length === 2 ? [...dots].sort((a, b) => down(a) - down(b))[1] : undefined;
   const keys = (dot: Dot) => (event: KeyboardEvent) => {
     const step = event.shiftKey ? 0.1 : 0.01;
     const by: Record<string, [number, number]> = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, -step], ArrowDown: [0, step] };
@@ -97,7 +100,7 @@ function View({ title, dots, axes, box, onMove, chosen, onChoose, children }: {
           onPointerDown={drag(dot)} onKeyDown={keys(dot)} onFocus={() => onChoose(dot.key)}>
           <circle cx={at[axes[0]]} cy={at[axes[1]]} r={0.28} class="touch" />
           <circle cx={at[axes[0]]} cy={at[axes[1]]} r={0.1} />
-          {(dots.length < 3 || dot.key === chosen) && <text x={at[axes[0]]! + 0.14} y={at[axes[1]]! - 0.14} class="words">{dot.label}</text>}
+          {(dots.length < 3 || dot.key === chosen) && <text x={at[axes[0]]! + 0.14} y={at[axes[1]]! + (dot === lower ? 0.14 : -0.14)} dominant-baseline={dot === lower ? "hanging" : "auto"} class="words">{dot.label}</text>}
         </g>;
       })}
     </svg>

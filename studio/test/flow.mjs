@@ -92,6 +92,9 @@ await run(async () => {
   assert.equal(Number(await from.inputValue()), first);
   await page.getByRole("button", { name: /^Antenna: forward .* right/ }).press("Shift+ArrowRight");
   await see(/The antenna is/);
+  const names = await page.locator(".place text").evaluateAll((all) => all.map((name) => name.getBoundingClientRect().toJSON()));
+  assert.equal(names.length, 4, "two points in two views");
+  assert.ok(names.every((a, i) => names.slice(i + 1).every((b) => a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top)), "no name covers another");
   await look("3-look");
   done("looked at");
 

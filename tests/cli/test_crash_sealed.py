@@ -205,6 +205,7 @@ def test_what_is_changed_in_the_manifest_is_refused_named_or_run_again(copy, no_
         "inputs role",
         # These are what was then, which nobody can check; the printed seal holds them.
         "versions",
+        "environment",
         "platform",
     }
 

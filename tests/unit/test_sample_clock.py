@@ -118,10 +118,11 @@ def delivered(time, size, rng, late):
     return np.repeat(ends, size) + np.tile(np.arange(size) * 1e-6, count // size), count
 
 
-@pytest.mark.parametrize("size", [4, 10, 20])
-def test_packets_are_spread_over_their_interval(taken, size):
+@pytest.mark.parametrize(("size", "late"), [(4, 0.05), (10, 0.05), (20, 0.05), (10, 0.0)])
+def test_packets_are_spread_over_their_interval(taken, size, late):
+    """Also of deliveries that are never late: those are at the steps of a clock."""
     step, time, rng = taken
-    stamps, count = delivered(time, size, rng, 0.05 * step)
+    stamps, count = delivered(time, size, rng, late * step)
     clock = sample_clock(stamps, motion(time[:count], rng))
     assert (clock.kind, clock.repaired, clock.lost) == ("bursts", True, 0)
     assert rate_error(clock, step) < 1e-3
@@ -154,6 +155,13 @@ def test_few_samples_have_the_rate_of_their_steps(count):
     clock = sample_clock(np.arange(count) * 0.02)
     assert clock.number.tolist() == list(range(count))
     assert clock.rate_hz == pytest.approx(50.0 if count > 1 else 1.0)
+
+
+@pytest.mark.parametrize("count", [5, 50])
+def test_stamps_that_do_not_advance_have_a_rate(count):
+    """One per second, so that no rate is infinite."""
+    clock = sample_clock(np.full(count, 3.0))
+    assert (clock.step, clock.kind, clock.rate_hz) == (1.0, "even", 1.0)
 
 
 def test_a_part_of_a_record_keeps_its_gaps_and_numbers():

@@ -553,7 +553,7 @@ KINDS: dict[str, Kind] = {
     "navigate": Kind(
         "Navigation",
         "Position, velocity and attitude over a record, with their uncertainty.",
-        "A log of gyros and accelerometers, and satellite fixes in it or in a file of their own.",
+        "a log of gyros and accelerometers, and satellite fixes in it or in a file of their own.",
         NavigationSpec,
         _draft_navigation,
         _by_file("navigate"),
@@ -562,7 +562,7 @@ KINDS: dict[str, Kind] = {
     "attitude": Kind(
         "Attitude",
         "The simplest attitude algorithm, and the lowest sample rate, that are accurate enough.",
-        "A log of gyros; what is known of the motion, such as that it ends as it began.",
+        "a log of gyros and, if possible, what is known of the motion: that it ends as it began.",
         AttitudeFile,
         _draft_of_options(
             "attitude",
@@ -575,7 +575,7 @@ KINDS: dict[str, Kind] = {
     "align": Kind(
         "Alignment",
         "Roll, pitch and heading of a body that does not move.",
-        "A log of gyros and accelerometers at rest, and the place.",
+        "a log of gyros and accelerometers at rest, and the place.",
         AlignmentSpec,
         _draft_alignment,
         _by_file("align"),
@@ -583,7 +583,7 @@ KINDS: dict[str, Kind] = {
     "crash": Kind(
         "Crash",
         "Delta-V, direction of force, severity and path of a crash, each with its bound.",
-        "Records of accelerometers on the vehicle, and how it moved before the crash.",
+        "records of accelerometers on the vehicle, and how it moved before the crash.",
         CaseSpec,
         _draft_crash,
         _by_file("crash"),
@@ -591,7 +591,7 @@ KINDS: dict[str, Kind] = {
     "allan": Kind(
         "Sensor noise",
         "Allan deviation and noise terms of a sensor, and its file for the other commands.",
-        "A log of the unmoved sensor, an hour or more.",
+        "a log of the unmoved sensor, an hour or more.",
         AllanFile,
         _draft_of_options(
             "allan",
@@ -603,7 +603,7 @@ KINDS: dict[str, Kind] = {
     "calibrate": Kind(
         "Calibration",
         "Bias, scale, misalignment and g-sensitivity of a sensor, each with its bound.",
-        "A log of the sensor at rest in nine or more poses, turned quickly between them.",
+        "a log of the sensor at rest in nine or more poses, turned quickly between them.",
         CalibrateFile,
         _draft_of_options(
             "calibrate",

@@ -200,25 +200,36 @@ def test_without_positions_of_a_receiver_nothing_is_found():
     assert wrong_stretches(first.record.innovations, {}) == ()
 
 
-@pytest.mark.parametrize(("speed", "count"), [(0.0, 0), (1.0, 1)])
-def test_velocities_that_agree_with_the_solution_show_a_receiver_that_is_wrong(speed, count):
-    """Positions that leave a solution by 1 m/s, with velocities that do so, too, or do not."""
-    table = fixes()
+def leaving(table, stays=0.0):
+    """Innovations of positions that leave a solution by 1 m/s and stay; the one at 8 m is taken."""
     time = table.index.to_numpy()
-    bad = (time > 50.0) & (time <= 58.0)
-    nu = np.where(bad, time - 50.0, 0.0)
-    weight = np.where(bad & (time < 58.0), 0.0, 1.0)
+    bad = (time > 50.0) & (time <= 58.0 + stays)
+    nu = np.where(bad, np.minimum(time - 50.0, 8.0), 0.0)
+    weight = np.where(bad & (time != 58.0), 0.0, 1.0)
     told = pd.DataFrame(index=table.index)
     for label, own in (("north, m", nu), ("east, m", 0.0 * nu), ("down, m", 0.0 * nu)):
         told[f"nu {label}"], told[f"s {label}"] = own, 0.01
         told[f"weight {label}"] = weight if own is nu else 1.0
-    columns = [f"{part} {label}" for part in ("nu", "s", "weight") for label in PLACE]
+    return told[[f"{part} {label}" for part in ("nu", "s", "weight") for label in PLACE]]
+
+
+@pytest.mark.parametrize(("speed", "count"), [(0.0, 0), (0.2, 0), (1.0, 1)])
+def test_velocities_that_agree_with_the_solution_show_a_receiver_that_is_wrong(speed, count):
+    """Positions that leave a solution by 1 m/s, with velocities that do so, too, or do not."""
+    table = fixes()
+    bad = (table.index > 50.0) & (table.index <= 58.0)
     velocity = pd.DataFrame({"nu VN, m/s": np.where(bad, speed, 0.0)}, index=table.index)
-    innovations = {"gnss.position": told[columns], "gnss.velocity": velocity}
-    found = wrong_stretches({"gnss.position": told[columns]}, {"gnss": table})
+    innovations = {"gnss.position": leaving(table), "gnss.velocity": velocity}
+    found = wrong_stretches({"gnss.position": leaving(table)}, {"gnss": table})
     assert [one.horizontal for one in found] == [8.0]
     with_velocity = wrong_stretches(innovations, {"gnss": table})
     assert len(with_velocity) == count
+
+
+def test_a_receiver_that_jumps_back_beside_a_solution_that_rejects_it_was_wrong():
+    """By the eight meters that it was off, five seconds after one of its positions was taken."""
+    table = fixes()
+    assert wrong_stretches({"gnss.position": leaving(table, stays=5.0)}, {"gnss": table}) == ()
 
 
 def test_stretches_that_follow_each_other_are_one():
@@ -377,13 +388,21 @@ def test_a_stretch_within_a_stretch_is_left_to_the_rule():
 
 
 @pytest.mark.parametrize(
-    ("every", "sd", "found"), [(5, 2.0, [90]), (1, 2.0, []), (1, 0.5, [90]), (1, 0.01, [0, 90])]
+    ("every", "until", "sd", "found"),
+    [
+        (5, 1e3, 2.0, [90]),
+        (1, 65.0, 2.0, [90]),
+        (1, 1e3, 2.0, []),
+        (1, 1e3, 0.5, [90]),
+        (1, 1e3, 0.01, [0, 90]),
+    ],
 )
-def test_what_a_correction_of_the_solution_moves_is_no_jump(every, sd, found):
+def test_what_a_correction_of_the_solution_moves_is_no_jump(every, until, sd, found):
     """A fix that turns it by 3 deg about an arm of 8 m, 0.4 m, and one that turns it back.
 
-    Between other fixes that correct it. Where rows are free of them, those show the motion; else a
-    jump is beyond the standard deviations, which 3 deg should not be. The positions jump by 2.6 m.
+    Between other fixes that correct it until an instant. Where rows are free of them, those show
+    the motion; else a jump is beyond the standard deviations, which 3 deg should not be. The
+    positions jump by 2.6 m.
     """
     arm = (8.0, 0.0, 0.0)
     table = town.fixes(5, position_noise=0.01, antenna=arm)
@@ -392,7 +411,7 @@ def test_what_a_correction_of_the_solution_moves_is_no_jump(every, sd, found):
     table.loc[bad, GEODETIC] = own
     trajectory = town.motion().trajectory(np.arange(0.0, town.motion().duration, 0.1))
     trajectory.loc[0.95:3.45, "heading"] += 3.0
-    told = pd.DataFrame({"weight north, m": 1.0}, index=trajectory.index[::every])
+    told = pd.DataFrame({"weight north, m": 1.0}, index=trajectory.index[::every]).loc[:until]
     marks = pd.DataFrame(sd, index=trajectory.index, columns=EULER).assign(
         VN=0.02, VE=0.02, VD=0.02
     )
