@@ -114,8 +114,8 @@ def test_every_slot_is_a_table_or_a_key(tmp_path):
 
 def test_the_manual_has_every_key():
     page = (ROOT / "docs" / "navigate.md").read_text()
-    forms = [f for f in vars(tables).values() if isinstance(f, type) and issubclass(f, Spec)]
-    for form in forms:
+    forms = {f for f in vars(tables).values() if isinstance(f, type) and issubclass(f, Spec)}
+    for form in forms - {tables.ExtrinsicsSpec}:  # which the flags of another command write
         if form.__module__ != tables.__name__ and form.__name__ not in ("LogTable", "AxesTable"):
             continue
         for name in form.model_fields:
