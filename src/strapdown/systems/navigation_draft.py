@@ -519,13 +519,19 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         if stated is None:
             continue
         full = {"gyro": "gyros", "accel": "accelerometers"}[name]
-        if _shakes(made, name, stated):
+        turns = "the biases as the turns of the whole record allow"
+        if set(stated) == {BIAS}:
+            why = f"Found: {turns}."
+        elif _shakes(made, name, stated):
             why = (
                 "Found: it shakes far beyond its noise at rest; half of the time so much, x, y, z:"
             )
             told.append(f"the {full} shake far beyond their noise while it is quiet")
         elif made.guessed:
-            why = "Found: noise while it is quiet, x, y, z; biases of the gyros as a rest allows."
+            why = (
+                "Found: noise while it is quiet, x, y, z; biases of the gyros as a rest, or the "
+                "turns of the whole record, allow."
+            )
         elif not _noisier(made, name, stated):
             why = "Found: noise while it is quiet, as units of a type differ, x, y, z:"
         else:
@@ -533,6 +539,8 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
                 "Found: noise beyond the data sheet while it is quiet: is it this sensor? x, y, z:"
             )
             told.append(f"the noise of the {full} exceeds that of {named}: is it this sensor?")
+        if BIAS in stated and not made.guessed and set(stated) != {BIAS}:
+            why += f" And {turns}."
         page.table(f"[sensors.{name}]", why)
         for key, value in stated.items():
             page.key(key, toml_value(value) or "")
@@ -579,6 +587,7 @@ def _whole() -> list[Any]:
     return [s for s in map(load_sensor, SENSORS) if s.grade != "crash"]
 
 
+BIAS = "bias_sd_deg_per_h"
 #: Noise of a unit over that of its data sheet, which is typical of the type.
 SPREAD = 1.25
 #: Ready-made tables for a vehicle.

@@ -117,6 +117,11 @@ COARSE = 100.0
 #: Levelling for a heading that is asked: the longest, s, and that of a body in motion, which may
 #: turn meanwhile.
 LEVELLED, LEVELLED_IN_MOTION = 10.0, 2.0
+#: Steps of a walk, by the standard deviation of the size of the specific force, m/s², of means over
+#: so long, s, through which an engine does not shake.
+STEPS, STEADY = 0.5, 0.1
+#: Part of a sensor's bias below which that by the turns of a record is stated.
+CLEARLY = 0.5
 #: Standard deviations that end an alignment by course, deg: of the tilt; and of the heading, which
 #: has that of the mounting of the unit, 5 deg, besides.
 WELL, HEADING = 3.0, 6.0
@@ -283,9 +288,18 @@ def propose(
         if table["sensors"]["sensor"] in SCALED:
             table["states"] = {name: dict(SCALES) for name in ("gyro_scale", "accel_scale")}
     rest = _rest(quiet, until, rocks=sensors is not None and _finds_north(sensors))
+    if sensors is not None and rest < LEVELLED_IN_MOTION:
+        # Nothing else says that a unit is better than its data sheet allows: by 20 deg/s the
+        # heading of a walk is open within seconds, and no linear filter finds it again.
+        turns = _bias_by_turns(imu)
+        if turns < CLEARLY * max(sensors.gyro.axis("bias")):
+            gyro = table["sensors"].get("gyro", {})
+            rate = float(f"{turns * DEG_PER_HOUR:.2g}")
+            table["sensors"]["gyro"] = {**gyro, "bias_sd_deg_per_h": rate}
+            sensors = _stated(table)
     span = float(imu.index[-1] - imu.index[0])
     measured = fixes is not None and np.isfinite(values_of(fixes, VELOCITY_SD[:2])).any()
-    levelled = _levelled(rest, until, span)
+    levelled = _levelled(imu, rest, until)
     chosen, how = _alignment(
         sensors, rest, drives, heading_deg, span, levelled, velocities=bool(measured)
     )
@@ -848,14 +862,39 @@ def _speed(fixes: pd.DataFrame) -> float:
     return float(np.sqrt(np.mean(np.square(ways_between(place) / np.diff(index_of(fixes))))))
 
 
-def _levelled(rest: float, until: float, span: float) -> float:
+def _levelled(imu: pd.DataFrame, rest: float, until: float) -> float:
     """How long to level a body whose heading is asked, s.
 
-    At most half of a record of `span` seconds: navigation needs the rest. `rest`, `until`: of the
-    body, and until the fixes prove motion.
+    At most half of the record: navigation needs the rest. `rest`, `until`: of the body, and until
+    the fixes prove motion, which those of a phone do of a walk after many steps.
     """
-    most = round(min(LEVELLED, 0.5 * span), 3)
-    return most if until >= most else min(most, max(rest, LEVELLED_IN_MOTION))
+    time = index_of(imu)
+    most = round(min(LEVELLED, 0.5 * float(time[-1] - time[0])), 3)
+    return (
+        most
+        if until >= most and not _steps(imu, most)
+        else min(most, max(rest, LEVELLED_IN_MOTION))
+    )
+
+
+def _steps(imu: pd.DataFrame, length: float) -> bool:
+    """Whether somebody walks with the body within its first `length` seconds."""
+    time = index_of(imu)
+    size = max(1, round(STEADY / float(np.median(np.diff(time)))))
+    force = np.linalg.norm(values_of(imu, ACCEL)[time - time[0] <= length], axis=1)
+    means = force[: len(force) // size * size].reshape(-1, size).mean(axis=1)
+    return len(means) > 1 and float(means.std()) > STEPS
+
+
+def _bias_by_turns(imu: pd.DataFrame) -> float:
+    """Standard deviation of the gyro biases by the turns of the whole record, rad/s.
+
+    A body turns about its own axes by a few turns at most, or it turns on and on: a mean rate has
+    the bias, and one turn in either direction over the record. Both cancel by chance alone.
+    """
+    time = index_of(imu)
+    mean = np.abs(np.trapezoid(values_of(imu, GYRO), time, axis=0)).max()
+    return math.hypot(float(mean), 2.0 * math.pi) / float(time[-1] - time[0])
 
 
 def _alignment(

@@ -10,7 +10,15 @@ from tests import town_drive as town
 
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.errors import DataError
-from strapdown.systems.navigation_proposal import HEADING, NO_ERRORS, WELL, _tried
+from strapdown.systems.navigation_proposal import (
+    HEADING,
+    NO_ERRORS,
+    WELL,
+    _bias_by_turns,
+    _levelled,
+    _tried,
+)
+from strapdown.tables import imu_table
 
 CHOSEN = {"coarse": {"until_heading_sd_deg": HEADING, "until_tilt_sd_deg": WELL}}
 
@@ -60,3 +68,40 @@ def test_without_any_the_heading_is_asked(monkeypatch, heading):
     coarse, findings, _ = tried(monkeypatch, heading)
     assert coarse["kind"] == "known_heading"
     assert [one.code for one in findings] == ["navigation.course-too-uncertain"]
+
+
+def carried(rate_deg_s, steps, duration=100.0):
+    """A unit in motion: turning about z, with the force of steps."""
+    time = np.arange(0.0, duration, 0.02)
+    gyro = np.zeros((len(time), 3))
+    gyro[:, 2] = np.radians(rate_deg_s)
+    accel = np.zeros((len(time), 3))
+    accel[:, 2] = 9.8 + steps * np.sin(2.0 * np.pi * 1.9 * time)
+    return imu_table(time, gyro, accel, sampling="mean", source="log.csv")
+
+
+@pytest.mark.parametrize(
+    ("steps", "rest", "until", "length"),
+    [
+        (2.5, 0.0, 60.0, 2.0),  # fixes of a phone do not prove a walk for a minute
+        (0.3, 0.0, 60.0, 10.0),  # a boat at its berth
+        (0.3, 0.0, 5.0, 2.0),
+        (0.3, 6.0, 5.0, 6.0),
+    ],
+)
+def test_a_walk_is_levelled_by_two_seconds(steps, rest, until, length):
+    assert _levelled(carried(0.0, steps), rest, until) == length
+
+
+def test_an_engine_is_no_walk():
+    imu = carried(0.0, 0.0)
+    time = imu.index.to_numpy()
+    imu["accel_z"] += 3.0 * np.sin(2.0 * np.pi * 23.0 * time)
+    assert _levelled(imu, 0.0, 60.0) == 10.0
+
+
+def test_the_turns_of_a_record_bound_the_biases():
+    """One turn of a standard deviation: 3.6 deg/s of 100 s; and the rate of one that turns on."""
+    assert np.degrees(_bias_by_turns(carried(0.0, 1.0))) == pytest.approx(3.6, rel=0.01)
+    assert np.degrees(_bias_by_turns(carried(0.0, 1.0, 400.0))) == pytest.approx(0.9, rel=0.01)
+    assert np.degrees(_bias_by_turns(carried(-18.0, 1.0))) == pytest.approx(18.4, rel=0.01)
