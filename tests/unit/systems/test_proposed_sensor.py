@@ -221,3 +221,25 @@ def test_quiet_sensors_with_large_slow_errors_follow_their_fixes(tmp_path, seed)
     # 1 cm of the fixes, and 2 ms between the clocks at 14 m/s.
     assert np.median(sd) < 0.03
     assert (np.abs(off) < 1.96 * sd).mean() > 0.9
+
+
+def test_without_a_rest_the_turns_of_a_record_bound_the_biases_of_a_named_unit(tmp_path):
+    """20 deg/s by its data sheet: the heading of a walk would be open within seconds."""
+    time = np.arange(0.0, 120.0, 0.02)
+    rng = np.random.default_rng(1)
+    gyro = np.radians(rng.normal(0.0, 20.0, (len(time), 3)))
+    accel = np.array([0.0, 0.0, 9.8]) + rng.normal(0.0, 2.0, (len(time), 3))
+    for rest, stated in ((0.0, True), (30.0, False)):
+        still = time < rest
+        gyro[still], accel[still] = 1e-4, [0.0, 0.0, 9.8]
+        gyro[still] += 1e-4 * rng.normal(size=(still.sum(), 3))
+        accel[still] += 1e-3 * rng.normal(size=(still.sum(), 3))
+        names = [*(f"gyro_{a}_rad_s" for a in "xyz"), *(f"accel_{a}_m_s2" for a in "xyz")]
+        table = pd.DataFrame(np.hstack([gyro, accel]), pd.Index(time, name="time_s"), names)
+        (tmp_path / "log.csv").write_text("# sampling: instantaneous\n" + table.to_csv())
+        log = LogTable(path=str(tmp_path / "log.csv"))
+        made = propose(log, axes="forward-right-down", sensor="mpu-6050")
+        own = made.table["sensors"].get("gyro", {})
+        assert ("bias_sd_deg_per_h" in own) == stated
+        if stated:
+            assert own["bias_sd_deg_per_h"] / 3600.0 == pytest.approx(3.0, rel=0.1)
