@@ -14,7 +14,7 @@ from strapdown.systems.navigation_proposal import (
     _rest,
     first_motion,
 )
-from strapdown.tables import gnss_table, imu_table
+from strapdown.tables import ACCEL, gnss_table, imu_table
 
 RATE = 10.0
 SD = 5.0
@@ -62,9 +62,11 @@ def test_by_places_the_drive_is_fast_enough_for_a_course():
 @pytest.mark.parametrize("heading_deg", [None, 30.0])
 def test_levelling_leaves_half_of_a_short_record_to_navigation(heading_deg):
     def length(span, rest):
-        return _alignment(None, rest, False, heading_deg, span, _levelled(rest, rest, span))[0][
-            "coarse"
-        ]["duration_s"]
+        time = pd.Index([0.0, span], name="time")
+        imu = pd.DataFrame(np.tile([0.0, 0.0, -9.81], (2, 1)), time, ACCEL)
+        levelled = _levelled(imu, rest, rest)
+        chosen, _ = _alignment(None, rest, False, heading_deg, span, levelled)
+        return chosen["coarse"]["duration_s"]
 
     assert length(6.5, 6.5) == 3.25
     assert length(600.0, 300.0) == 10.0
