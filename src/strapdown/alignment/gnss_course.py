@@ -190,14 +190,12 @@ class GnssCourse(CoarseAlignment):
         slowest, widest = self.least_speed, math.radians(self.largest_sd_deg)
         fixes = course_fixes(imu, gnss, slowest, widest, antenna)
         assert gnss is not None  # refused otherwise
-        stamps = gnss.index.to_numpy(dtype=np.float64)
-        placed = usable(gnss, POSITION_SD)
-        placed &= (stamps >= imu.index[0]) & (stamps <= imu.index[-1])
-        if placed.any():
+        newest = _placed(gnss, imu)[-NEWEST:]
+        if newest.size:
             # Axes and rate of the Earth are those of the end: of a place 4 km before, the start
             # would be 2 cm/s off in five minutes.
-            places = gnss[GEODETIC].to_numpy(dtype=np.float64)[placed]
-            lat_deg, lon_deg, alt = np.median(places[-NEWEST:], axis=0).tolist()
+            places = gnss[GEODETIC].to_numpy(dtype=np.float64)[newest]
+            lat_deg, lon_deg, alt = np.median(places, axis=0).tolist()
             site = Site(lat_deg, lon_deg, alt, site.ellipsoid)
         rests = rest_rates(imu, fixes, sensors)
         yaw = math.radians(self.mounting_yaw_deg) + (math.pi if self.reverse else 0.0)
@@ -512,16 +510,15 @@ class CourseFit:
         fixes = self.fixes
         stamps = gnss.index.to_numpy(dtype=np.float64)
         sd = gnss[POSITION_SD].to_numpy(dtype=np.float64)
-        good = usable(gnss, POSITION_SD)
-        good &= (stamps >= self.imu.index[0]) & (stamps <= self.imu.index[-1])
-        if not good.any():
+        placed = _placed(gnss, self.imu)
+        if not placed.size:
             return None
         places = gnss[GEODETIC].to_numpy(dtype=np.float64)
-        origin, newest = fixes.origin, int(np.flatnonzero(good)[-1])
+        origin, newest = fixes.origin, int(placed[-1])
         if origin is None:
             ahead = found.velocity * (self.imu.index[-1] - stamps[newest])
             origin = geodetic_from_ned(ahead, places[newest], ellipsoid=self.site.ellipsoid)
-        rows = np.flatnonzero(good)[:ANCHORS]
+        rows = placed[:ANCHORS]
         here = ned_from_geodetic(places[rows], origin, ellipsoid=self.site.ellipsoid)
         return stamps[rows], here, np.maximum(sd[rows], LEAST_SD), origin
 
@@ -958,6 +955,13 @@ CLEAR = 6.0
 MOST = 0.5
 # The heading is the median of the courses over this duration, s.
 HEADING_SPAN = 5.0
+
+
+def _placed(gnss: pd.DataFrame, imu: pd.DataFrame) -> Indices:
+    """Rows of the fixes with a position within the samples."""
+    stamps = gnss.index.to_numpy(dtype=np.float64)
+    within = (stamps >= imu.index[0]) & (stamps <= imu.index[-1])
+    return np.flatnonzero(usable(gnss, POSITION_SD) & within)
 
 
 def left_out(fixes: CourseFixes, found: CourseEstimate) -> tuple[Finding, ...]:

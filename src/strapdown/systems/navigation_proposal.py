@@ -870,11 +870,9 @@ def _levelled(imu: pd.DataFrame, rest: float, until: float) -> float:
     """
     time = index_of(imu)
     most = round(min(LEVELLED, 0.5 * float(time[-1] - time[0])), 3)
-    return (
-        most
-        if until >= most and not _steps(imu, most)
-        else min(most, max(rest, LEVELLED_IN_MOTION))
-    )
+    if until >= most and not _steps(imu, most):
+        return most
+    return min(most, max(rest, LEVELLED_IN_MOTION))
 
 
 def _steps(imu: pd.DataFrame, length: float) -> bool:
