@@ -1,10 +1,10 @@
-"""Stretches of a run over which its solution went wrong beyond its bounds, and their noise."""
+"""Stretches of a run over which its solution or its receiver went wrong, and their errors."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -39,6 +39,19 @@ BESIDE, JUMPED, STATED = 5, 6.0, 5.0
 NEAR, FEWEST = 2, 5
 #: Part of a jump by which the one back may differ.
 ALIKE = 0.5
+#: Float solutions: their scatter from fix to fix, and what separates them from fixed ones, in
+#: standard deviations of a step of the latter, as first supposed; times the stated standard
+#: deviation that they are at least. They begin and end once in so long, s.
+FLOATS, APART, LARGER = 4.0, 30.0, 3.0
+BEGINS, ENDS = 60.0, 10.0
+#: Quality of a float solution in NMEA 0183 GGA.
+FLOAT = 5
+#: Passes over the steps, each with the sizes of the last; share of fixed solutions that are gross
+#: errors; median of chi-square of three components; chance below which a solution is fixed.
+PASSES, GROSS, CHI_MEDIAN, UNLIKELY = 10, 0.02, 2.366, 0.1
+#: Largest share of the record in which positions are not the usual ones.
+MOST = 0.5
+TINY = 1e-9
 #: Velocities that together show whether a position changed as they say, and part of the change.
 TOGETHER, CONFIRMS = 3, 0.3
 
@@ -157,27 +170,13 @@ def displaced_stretches(
     size : float, m
         Largest of their displacements.
     """
-    own = record.trajectory
-    at = index_of(table) - aid.time_offset
-    used = usable(table, POSITION_SD) & np.isin(table["quality"], aid.qualities)
-    rows = np.flatnonzero(used & (at >= own.index[0]) & (at <= own.index[-1]))
-    if len(rows) < 4 * BESIDE or not aid.use_position:
+    rows, at, steps, stated = _steps(record, table, aid)
+    if len(rows) < 4 * BESIDE:
         return (), 0.0
-    place, at = values_of(table, GEODETIC)[rows], at[rows]
-    way, told = _way(record, at, np.asarray(aid.lever_arm))
-    steps = place_difference(place[1:], place[:-1]) - np.diff(way, axis=0)
-    # Beyond the steps before and those after, between which is that of a velocity that changes.
-    around = np.pad(steps, ((BESIDE, BESIDE), (0, 0)), mode="reflect")
-    around = np.median(np.lib.stride_tricks.sliding_window_view(around, BESIDE, axis=0), axis=-1)
-    before, after = around[: len(steps)], around[-len(steps) :]
-    steps = steps - np.clip(steps, np.minimum(before, after), np.maximum(before, after))
     scatter = MAD_TO_SD * np.median(np.abs(steps), axis=0)
-    sd = aid.position_sd_factor * values_of(table, POSITION_SD)[rows]
-    slip = np.where(told[:, None], 0.0, _slip(record, at, float(np.linalg.norm(aid.lever_arm))))
-    stated = np.sqrt(np.square(sd[1:]) + np.square(sd[:-1]) + np.square(slip))
     allowed = np.maximum(JUMPED * scatter, STATED * stated)
     begins = [0, *(gap.sample for gap in find_gaps(at))]
-    struck = (np.abs(steps) > allowed).any(axis=1)
+    struck: NDArray[np.bool_] = np.any(np.abs(steps) > allowed, axis=1)
     struck[np.array(begins[1:], dtype=np.intp) - 1] = False  # what an outage made of the solution
     # A solution that is corrected in earnest swings over several steps: those together are no jump.
     beside = np.convolve(struck, np.ones(2 * NEAR + 1), "same") - struck
@@ -195,9 +194,140 @@ def displaced_stretches(
     stamps = index_of(table)[rows]
     middle = 0.5 * (stamps + np.append(stamps[0], stamps[:-1]))
     stretches = [(float(middle[begin]), float(middle[end])) for begin, end in sorted(found)]
-    if sum(end - begin for begin, end in stretches) > 0.5 * (stamps[-1] - stamps[0]):
+    if sum(end - begin for begin, end in stretches) > MOST * (stamps[-1] - stamps[0]):
         return (), 0.0
     return tuple(stretches), size
+
+
+def stated_floats(
+    record: NavigationRecord, table: pd.DataFrame, aid: Gnss
+) -> tuple[pd.DataFrame, Gnss] | None:
+    """State the float solutions of a receiver whose fixes do not, by how they move.
+
+    A receiver that loses its carrier-phase ambiguities jumps to a position with an error of another
+    order of magnitude, which wanders until it fixes them again, and jumps back. What positions
+    moved beyond the motion of the solution is then of three sizes: between fixed solutions, between
+    float ones, and from one to the other. The chances of the two kinds (forward and backward:
+    Rabiner 1989, Proc. IEEE 77) and their sizes are found in turn.
+
+    Parameters
+    ----------
+    record, table, aid
+        As of `displaced_stretches`.
+
+    Returns
+    -------
+    table : DataFrame
+        With the standard deviations and the quality of float solutions, where they are.
+    aid : Gnss
+        With the `float_position_sd` that separates them. None where there are none.
+    """
+    rows, at, steps, stated = _steps(record, table, aid)
+    if len(rows) < 4 * BESIDE or aid.float_position_sd:
+        return None
+    usual = np.maximum(MAD_TO_SD * np.median(np.abs(steps), axis=0), TINY)
+    square = np.square(steps / usual).sum(axis=1)
+    square[[gap.sample - 1 for gap in find_gaps(at)]] = np.nan  # says nothing
+    looser, apart = FLOATS, APART
+    floats = np.zeros(len(rows), dtype=np.bool_)
+    for _ in range(PASSES):
+        chance = _chance_of_floats(square, np.diff(at), looser, apart)
+        before, floats = floats, chance > 0.5
+        if (floats == before).all():
+            break
+        within = square[floats[1:] & floats[:-1]]
+        between = square[floats[1:] != floats[:-1]]
+        if len(within) < FEWEST or len(between) < 2:
+            return None
+        looser, apart = (math.sqrt(np.nanmedian(each) / CHI_MEDIAN) for each in (within, between))
+    # A fixed solution that is taken for a float one costs little.
+    sd, floats = apart * usual, chance > UNLIKELY
+    if not 0.0 < floats.mean() <= MOST or (sd < LARGER * np.median(stated, axis=0)).any():
+        return None
+    out = table.copy()
+    where = table.columns.get_indexer(pd.Index([*POSITION_SD, "quality"]))
+    larger = np.maximum(values_of(table, POSITION_SD)[rows[floats]], sd / aid.position_sd_factor)
+    out.iloc[rows[floats], where] = np.column_stack([larger, np.full(len(larger), FLOAT)])
+    limit = np.median(np.hypot(*values_of(table, POSITION_SD)[rows, :2].T))
+    limit = math.sqrt(0.5 * limit * math.hypot(*sd[:2]) / aid.position_sd_factor)
+    return out, replace(aid, float_position_sd=limit)
+
+
+def _chance_of_floats(square: Array, dt: Array, looser: float, apart: float) -> Array:
+    """Chance that solutions are float ones, by the steps between all: a hidden Markov chain.
+
+    Parameters
+    ----------
+    square : ndarray, (n - 1,)
+        Sum of the squares of the three components of a step, in variances of one between fixed
+        solutions; NaN of one that says nothing.
+    dt : ndarray, (n - 1,), s
+    looser, apart : float
+        Standard deviations of a step between float solutions, and of one between both kinds.
+
+    Returns
+    -------
+    ndarray, (n,)
+    """
+
+    def likely(sd: float) -> Array:
+        return np.nan_to_num(-0.5 * square / sd**2 - 3.0 * math.log(sd))
+
+    # A gross error of a fixed solution, now and then, is none.
+    fixed = np.logaddexp(likely(1.0) + math.log(1.0 - GROSS), likely(JUMPED) + math.log(GROSS))
+    begin, end = np.minimum(dt / BEGINS, 0.5), np.minimum(dt / ENDS, 0.5)
+    change = likely(max(apart, looser))
+    # By kind before and after, relative to the likeliest.
+    ways = np.empty((len(dt), 2, 2))
+    ways[:, 0, 0], ways[:, 0, 1] = fixed + np.log1p(-begin), change + np.log(begin)
+    ways[:, 1, 0], ways[:, 1, 1] = change + np.log(end), likely(looser) + np.log1p(-end)
+    ways = np.exp(ways - ways.max(axis=(1, 2), keepdims=True))
+    before, after = np.empty((len(dt) + 1, 2)), np.ones((len(dt) + 1, 2))
+    before[0] = 1.0, ENDS / BEGINS
+    for k, way in enumerate(ways):
+        before[k + 1] = before[k] @ way
+        before[k + 1] /= before[k + 1].sum()
+    for k in range(len(ways) - 1, -1, -1):
+        after[k] = ways[k] @ after[k + 1]
+        after[k] /= after[k].sum()
+    both = before * after
+    return np.asarray(both[:, 1] / both.sum(axis=1))
+
+
+def _steps(
+    record: NavigationRecord, table: pd.DataFrame, aid: Gnss
+) -> tuple[NDArray[np.intp], Array, Array, Array]:
+    """By how much positions move from fix to fix beyond the motion of a solution.
+
+    Returns
+    -------
+    rows : ndarray, (n,)
+        Of the table that are used; none of a receiver without positions.
+    at : ndarray, (n,), s
+        Their instants.
+    steps : ndarray, (n - 1, 3), m
+        North, east, down, beyond those before and those after, between which is that of a velocity
+        of the solution that changes.
+    stated : ndarray, (n - 1, 3), m
+        Their standard deviation, by those stated.
+    """
+    own = record.trajectory
+    at = index_of(table) - aid.time_offset
+    used = usable(table, POSITION_SD) & np.isin(table["quality"], aid.qualities)
+    rows = np.flatnonzero(used & (at >= own.index[0]) & (at <= own.index[-1]))
+    if len(rows) < 2 * BESIDE or not aid.use_position:
+        return rows[:0], at[:0], np.empty((0, 3)), np.empty((0, 3))
+    place, at = values_of(table, GEODETIC)[rows], at[rows]
+    way, told = _way(record, at, np.asarray(aid.lever_arm))
+    steps = place_difference(place[1:], place[:-1]) - np.diff(way, axis=0)
+    around = np.pad(steps, ((BESIDE, BESIDE), (0, 0)), mode="reflect")
+    around = np.median(np.lib.stride_tricks.sliding_window_view(around, BESIDE, axis=0), axis=-1)
+    before, after = around[: len(steps)], around[-len(steps) :]
+    steps = steps - np.clip(steps, np.minimum(before, after), np.maximum(before, after))
+    sd = aid.position_sd_factor * values_of(table, POSITION_SD)[rows]
+    slip = np.where(told[:, None], 0.0, _slip(record, at, float(np.linalg.norm(aid.lever_arm))))
+    stated = np.sqrt(np.square(sd[1:]) + np.square(sd[:-1]) + np.square(slip))
+    return rows, at, steps, stated
 
 
 def _paired(jumps: list[int], steps: Array, allowed: Array) -> list[tuple[int | None, int]]:

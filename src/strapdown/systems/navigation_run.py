@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import takewhile
@@ -65,7 +65,13 @@ from strapdown.navigation.record import (
     standard_deviations,
 )
 from strapdown.navigation.recorder import IntervalRecorder, Recorder
-from strapdown.navigation.recovery import displaced_stretches, longest, wrong_stretches
+from strapdown.navigation.recovery import (
+    FLOAT,
+    displaced_stretches,
+    longest,
+    stated_floats,
+    wrong_stretches,
+)
 from strapdown.navigation.replay import PipelineRun, relinearized, run_batch, starts_far
 from strapdown.navigation.smoother import RauchTungStriebel
 from strapdown.navigation.truth_comparison import SmootherConsistency, smoother_consistency
@@ -185,14 +191,20 @@ def run_navigation(
     def show_mode(mode: str, share: float) -> None:
         progress(mode, BEGUN + (ENDED - BEGUN) * share)
 
-    def again(other: NavigationPipeline) -> PipelineRun:
-        return drive(other, source.imu, source.tables, recorder, show_mode)
+    def again(
+        other: NavigationPipeline, other_source: NavigationSource | None = None
+    ) -> PipelineRun:
+        used = other_source or source
+        return drive(other, used.imu, used.tables, recorder, show_mode)
 
     progress("aligning" if spec.start is None else "navigating", BEGUN)
     with said_of_file(*tables):
         run = again(chain)
         chain, run, by_offset = _with_settled_offsets(chain, run, again)
-        chain, run, by_displacement = _without_displacements(chain, run, source.tables, again)
+        chain, run, source, by_jumps = _with_jumps(chain, run, source, again)
+        if by_jumps:
+            chain, run, more = _with_settled_offsets(chain, run, again)
+            by_offset += more
         begun_with = chain
         if not by_offset and run.smoothed is None:
             chain, by_offset = _with_known_offsets(chain, run.record, source.tables)
@@ -290,7 +302,7 @@ def run_navigation(
         *_lost_start(chain, source.imu, best.trajectory),
         *_unsettled(run),
         *by_grade,
-        *in_file((*by_offset, *by_displacement, *by_recovery), *tables),
+        *in_file((*by_offset, *by_jumps, *by_recovery), *tables),
     ]
     return NavigationRun(
         spec=spec,
@@ -478,43 +490,66 @@ def _with_known_offsets(
     return chain, tuple(findings)
 
 
-def _without_displacements(
+def _with_jumps(
     chain: NavigationPipeline,
     run: PipelineRun,
-    tables: Mapping[str, pd.DataFrame],
-    drive: Callable[[NavigationPipeline], PipelineRun],
-) -> tuple[NavigationPipeline, PipelineRun, tuple[Finding, ...]]:
-    """Repeat a run over positions that jump away and back, with their displacement as a state.
+    source: NavigationSource,
+    drive: Callable[[NavigationPipeline, NavigationSource], PipelineRun],
+) -> tuple[NavigationPipeline, PipelineRun, NavigationSource, tuple[Finding, ...]]:
+    """Repeat a run over positions that jump away and back, as what explains the measurements best.
 
-    Kept where it explains the measurements better, rejected ones included.
+    Rejected ones included, and far better than without.
     """
-    findings: tuple[Finding, ...] = ()
     for aid in chain.navigator.aids:
-        if not isinstance(aid, Gnss) or aid.displaced:
+        if not isinstance(aid, Gnss):
             continue
-        found, size = displaced_stretches(run.record, tables[aid.name], aid)
-        if not found:
-            continue
-        other = _with_aid(chain, replace(aid, displaced=found))
-        try:
-            again = drive(other)
-        except DivergenceError:
-            continue
-        gain, count = likelihood_gain(run.record.innovations, again.record.innovations)
-        if gain < max(LEAST_GAIN, GAIN_EACH * count):
-            continue
-        chain, run = other, again
-        findings += (
-            Finding(
-                "navigation.run-again-with-displacement",
-                file=source_of(tables[aid.name]),
-                quantity="lat, lon, alt",
-                size=size,
-                listed=[f"{begin:.5g} to {end:.5g} s" for begin, end in found],
-                given=str([[round(x, 3) for x in one] for one in found]),
-            ),
+        best, least = None, LEAST_GAIN
+        for other, table, finding in _jumping(run.record, source.tables[aid.name], aid):
+            tables = {**source.tables, aid.name: table}
+            tried = _with_aid(chain, other), replace(source, tables=tables)
+            try:
+                again = drive(*tried)
+            except DivergenceError:
+                continue
+            gain, count = likelihood_gain(run.record.innovations, again.record.innovations)
+            if gain >= max(least, GAIN_EACH * count):
+                best, least = (*tried, again, finding), gain
+        if best is not None:  # a record may have both, each once
+            chain, source, run, finding = best
+            chain, run, source, more = _with_jumps(chain, run, source, drive)
+            return chain, run, source, (finding, *more)
+    return chain, run, source, ()
+
+
+def _jumping(
+    record: NavigationRecord, table: pd.DataFrame, aid: Gnss
+) -> Iterator[tuple[Gnss, pd.DataFrame, Finding]]:
+    """What positions that jump may be: a receiver that knows it, its fixes, and the finding."""
+    file = source_of(table)
+    stated = stated_floats(record, table, aid)
+    if stated is not None:
+        floats = index_of(table)[(stated[0]["quality"] == FLOAT).to_numpy()]
+        finding = Finding(
+            "navigation.run-again-with-floats",
+            file=file,
+            quantity="lat, lon, alt",
+            count=len(floats),
+            rows=len(table),
+            first=float(floats[0]),
+            last=float(floats[-1]),
         )
-    return chain, run, findings
+        yield stated[1], stated[0], finding
+    found, size = displaced_stretches(record, table, aid)
+    if found and not aid.displaced:
+        finding = Finding(
+            "navigation.run-again-with-displacement",
+            file=file,
+            quantity="lat, lon, alt",
+            size=size,
+            listed=[f"{begin:.5g} to {end:.5g} s" for begin, end in found],
+            given=str([[round(x, 3) for x in one] for one in found]),
+        )
+        yield replace(aid, displaced=found), table, finding
 
 
 def _with_aid(chain: NavigationPipeline, aid: Measurement) -> NavigationPipeline:

@@ -20,12 +20,13 @@ from strapdown.navigation.recovery import (
     Wrong,
     displaced_stretches,
     longest,
+    stated_floats,
     wrong_stretches,
 )
 from strapdown.navigation.replay import PipelineRun
 from strapdown.navigation.smoother import RauchTungStriebel
-from strapdown.systems.navigation_run import _recovered, _without_displacements
-from strapdown.tables import EULER, GEODETIC, VELOCITY, VELOCITY_SD
+from strapdown.systems.navigation_run import _recovered, _with_jumps
+from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
 RULE = AdaptiveRule(Igg3(), AdaptiveScale(lowest=1.0))
 
@@ -35,6 +36,13 @@ class SimpleChain:
     """What of a pipeline a recovery changes."""
 
     navigator: Navigator
+
+
+@dataclass(frozen=True)
+class Source:
+    """What of the input of a run float solutions change."""
+
+    tables: dict
 
 
 def fixes(seed=5):
@@ -57,10 +65,10 @@ def pushed(push=0.0, turn=0.0, begin=50.0, end=58.0):
 def navigated(table, samples, smoother=None, asked=None, step=_recovered):
     """The run as its pipeline would have it, repeated where it is contradicted."""
 
-    def drive(chain):
+    def drive(chain, other=None):
         _, state = town.begun(*chain.navigator.aids)
         navigator = chain.navigator
-        state = navigator.tell(state, "gnss", table)
+        state = navigator.tell(state, "gnss", table if other is None else other.tables["gnss"])
         state, piece = navigator.advance(state, *samples)
         tape = FullRecorder().begin(navigator)
         smoothing = None if smoother is None else smoother.begin(navigator)
@@ -73,8 +81,9 @@ def navigated(table, samples, smoother=None, asked=None, step=_recovered):
 
     navigator, _ = town.begun(town.gnss(rule=RULE))
     chain = SimpleChain(replace(navigator, smoother=smoother))
-    first = drive(chain)
-    return first, step(chain, first, {"gnss": table}, drive if asked is None else asked)
+    first, tables = drive(chain), {"gnss": table}
+    source = tables if step is _recovered else Source(tables)
+    return first, step(chain, first, source, drive if asked is None else asked)
 
 
 def off(record):
@@ -268,9 +277,7 @@ def displaced(*stretches, sd=0.05, seed=5):
 def test_positions_that_jump_away_and_back_do_not_pull_the_solution(smoother):
     """Forty seconds beside by 26 m, and another stretch of another size, with positions alone."""
     table = displaced((40.0, 80.0, FAULT), (120.0, 130.0, -0.4 * FAULT))
-    first, (chain, run, (finding,)) = navigated(
-        table, pushed(), smoother, step=_without_displacements
-    )
+    first, (chain, run, _, (finding,)) = navigated(table, pushed(), smoother, step=_with_jumps)
     assert finding.code == "navigation.run-again-with-displacement"
     one, other = chain.navigator.aids[0].displaced
     # Between two fixes, which are half a second apart.
@@ -286,7 +293,7 @@ def test_positions_that_jump_away_and_back_do_not_pull_the_solution(smoother):
 def test_the_displacement_of_a_stretch_is_estimated_with_its_error(seed):
     """At the end of each stretch: the error within 4 standard deviations, these below a fix's."""
     table = displaced((40.0, 60.0, FAULT), (90.0, 110.0, -0.8 * FAULT), sd=1.0, seed=100 + seed)
-    _, (_, run, _) = navigated(table, pushed(), step=_without_displacements)
+    _, (_, run, _, _) = navigated(table, pushed(), step=_with_jumps)
     names = [f"gnss.displacement_{axis}" for axis in ("north", "east", "down")]
     for end, true in ((59.9, FAULT), (109.9, -0.8 * FAULT)):
         at = run.record.sensors.index.searchsorted(end)
@@ -337,11 +344,15 @@ def test_positions_that_are_displaced_any_cut_gives_the_same_bits():
 
 def seen(table, aid=None, slip=0.0):
     """Stretches that are found beside a solution whose velocity is off by a constant, m/s."""
+    return displaced_stretches(solution(slip), table, aid or town.gnss())[0]
+
+
+def solution(slip=0.0):
+    """Record of a solution whose velocity is off by a constant, m/s."""
     trajectory = town.motion().trajectory(np.arange(0.0, town.motion().duration, 0.1))
     trajectory[VELOCITY] += slip
     sd = pd.DataFrame(1.0, index=trajectory.index[::5], columns=[*VELOCITY, *EULER])
-    record = SimpleNamespace(trajectory=trajectory, innovations={}, sd=sd)
-    return displaced_stretches(record, table, aid or town.gnss())[0]
+    return SimpleNamespace(trajectory=trajectory, innovations={}, sd=sd)
 
 
 def test_a_velocity_that_is_off_makes_no_jump_and_hides_none():
@@ -435,7 +446,7 @@ def test_a_wrong_fix_after_an_outage_does_not_keep_the_right_ones_out():
     """After 36 s without fixes one 6.4 m off, 1.5 sd: the rule held it against all others."""
     table = displaced((95.9, 96.4, [5.0, -4.0, 0.0]))
     table = table[(table.index < 60.0) | (table.index > 95.9)]
-    first, (_, run, (finding,)) = navigated(table, pushed(), step=_without_displacements)
+    first, (_, run, _, (finding,)) = navigated(table, pushed(), step=_with_jumps)
     assert finding.code == "navigation.run-again-with-displacement"
     (before, _), (after, bounds) = off(first.record), off(run.record)
     soon = slice(*first.record.trajectory.index.searchsorted([96.6, 110.0]))
@@ -452,3 +463,86 @@ def test_the_step_over_an_outage_is_no_jump():
     at = np.arange(0.0, town.motion().duration, 0.1)
     slip = 0.4 * (((at > 40.2) & (at < 59.8)) * 1.0 - ((at > 90.2) & (at < 109.8)))
     assert seen(table, slip=slip[:, None]) == ()
+
+
+FIXED_SD, FLOAT_SD, WANDERS = 0.02, 0.4, 20.0
+
+
+def carrier_phase(seed, *stretches, floats=FLOAT_SD, lasting=0.0, hz=5.0):
+    """Positions by carrier phase, all stated alike, and which of them are float solutions."""
+    rng = np.random.default_rng(seed)
+    table = town.fixes(seed, position_noise=FIXED_SD, rate=hz)
+    table[VELOCITY], table[VELOCITY_SD] = 0.0, np.inf
+    time = table.index.to_numpy()
+    loose = np.zeros(len(table), dtype=bool)
+    for begin, end in stretches:
+        loose |= (time > begin) & (time < end)
+    keeps = np.exp(-np.diff(time, prepend=time[0] - 1e6) / WANDERS)
+    error = np.zeros(3)
+    for k, place in enumerate(table[GEODETIC].to_numpy()):
+        error = keeps[k] * error + np.sqrt(1.0 - keeps[k] ** 2) * rng.normal(size=3)
+        moved = (floats if loose[k] else lasting) * error
+        table.iloc[k, table.columns.get_indexer(GEODETIC)] = geodetic_from_ned(moved, place)
+    return table, loose
+
+
+LOOSE = ((20.0, 32.0), (50.0, 53.0), (80.0, 95.0), (95.4, 97.0), (120.0, 124.0))
+
+
+@pytest.mark.parametrize(("hz", "share"), [(1.0, 0.95), (5.0, 0.99)])
+def test_float_solutions_that_nothing_states_are_found_by_how_they_move(hz, share):
+    """Of 20 records: 95 and 99 % of the float solutions and more, and 1 % of the others and less.
+
+    One whose error passes through zero at its begin or end is as a fixed one there.
+    """
+    found, size = np.zeros((2, 2)), []
+    for seed in range(20):
+        table, loose = carrier_phase(seed, *LOOSE, hz=hz)
+        out, aid = stated_floats(solution(), table, town.gnss())
+        given = (out["quality"] == 5).to_numpy()
+        found += [[(given & loose).sum(), loose.sum()], [(given & ~loose).sum(), (~loose).sum()]]
+        size.append(out.loc[given, POSITION_SD].iloc[0].to_numpy())
+        assert FIXED_SD < aid.float_position_sd < 0.5 * FLOAT_SD
+        pd.testing.assert_frame_equal(out[~given], table[~given])
+        pd.testing.assert_frame_equal(out[GEODETIC], table[GEODETIC])
+    assert found[0, 0] >= share * found[0, 1]
+    assert found[1, 0] <= 0.01 * found[1, 1]
+    # About ten changes of three components each: 0.18 of their logarithm in a record.
+    assert np.median(np.log(np.array(size) / FLOAT_SD)) == pytest.approx(0.0, abs=0.18)
+
+
+def test_fixes_of_one_kind_are_not_divided():
+    """Sound ones, displaced by a constant, gross errors, errors that last, and what is stated."""
+    for seed in range(10):
+        assert stated_floats(solution(), displaced(seed=seed), town.gnss()) is None
+        table, _ = carrier_phase(seed, lasting=0.5)
+        assert stated_floats(solution(), table, town.gnss()) is None
+    for table in (
+        displaced((40.0, 80.0, FAULT), (120.0, 130.0, -0.4 * FAULT)),
+        displaced(*((t, t + 0.6, FAULT * (-1) ** t) for t in range(20, 160, 13))),
+        displaced((40.0, 200.0, FAULT)),
+        carrier_phase(0, (10.0, 100.0), (110.0, 160.0))[0],
+        carrier_phase(0, *LOOSE)[0].iloc[:10],
+    ):
+        assert stated_floats(solution(), table, town.gnss()) is None
+    table, _ = carrier_phase(0, *LOOSE)
+    for aid in (town.gnss(float_position_sd=0.1), town.gnss(use_position=False)):
+        assert stated_floats(solution(), table, aid) is None
+
+
+def test_float_solutions_that_nothing_states_do_not_pull_the_solution():
+    """Eight records: errors a half of those before and less, in the median a quarter."""
+    ratios = []
+    for seed in range(8):
+        table, loose = carrier_phase(seed, *LOOSE)
+        table.loc[:, POSITION_SD] = FIXED_SD
+        first, (chain, run, source, (finding,)) = navigated(table, pushed(), step=_with_jumps)
+        assert finding.code == "navigation.run-again-with-floats"
+        assert finding.data["count"] == pytest.approx(loose.sum(), rel=0.15)
+        assert (source.tables["gnss"]["quality"] == 5).sum() == finding.data["count"]
+        assert chain.navigator.aids[0].float_position_sd > 0.0
+        (before, _), (after, bounds) = off(first.record), off(run.record)
+        assert bounds.max() < 2.5
+        ratios.append(np.sqrt(np.mean(after**2) / np.mean(before**2)))
+    assert max(ratios) < 0.6
+    assert np.median(ratios) < 0.25
