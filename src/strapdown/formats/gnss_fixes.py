@@ -391,7 +391,7 @@ def _by_quality(fixes: Fixes, sd: Array, quality: Array, taken: dict[str, float]
         stated = taken["position_sd_taken"] = min(given, float(sizes[0]))
         sd = np.full_like(sd, stated)
     own = sizes[np.argmin(np.abs(np.log(sizes / stated)))]
-    worse = usual > max(float(own), stated)
+    worse = usual > own
     sd = np.where(worse[:, None], sd * (usual / stated)[:, None], sd)
     if worse.any() or stated < given:
         kinds = [

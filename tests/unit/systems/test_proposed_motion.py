@@ -53,9 +53,9 @@ def test_a_rest_whose_places_scatter_is_no_drive():
 
 
 def test_autonomous_fixes_among_fixed_solutions_are_no_drive():
-    """At rest: every fifth is autonomous, and 2 m beside; 5 m are assumed of it, and not 0.3."""
+    """At rest: one of thirty is autonomous, and 2 m beside; 5 m are assumed of it, and not 0.3."""
     table = fixes(0.0, noise=0.01)
-    autonomous = np.arange(len(table)) % 5 == 0
+    autonomous = np.arange(len(table)) % 30 == 0
     table[POSITION_SD] = np.tile(np.where(autonomous, 5.0, 0.02)[:, None], 3)
     table.loc[autonomous, "lat"] += np.degrees(2.0 / 6.37e6)
     table.attrs["position_sd_taken"] = 0.02
