@@ -22,7 +22,7 @@ from strapdown.tables.checks import (
     VELOCITY_SD,
     Array,
 )
-from strapdown.tables.gnss import check_velocity
+from strapdown.tables.gnss import FIX_KINDS, check_velocity
 
 Sd = float | tuple[float, float, float]
 
@@ -34,6 +34,12 @@ UNSTATED_VERTICAL = 2.0
 #: Level of fixes without heights, and the standard deviation of the one that a user states for all
 #: of them, m, unless stated, too.
 NOWHERE, STATED_HEIGHT_SD = "nowhere", 100.0
+#: Usual standard deviation of a horizontal position, a component, m, by the quality of NMEA 0183
+#: GGA. Mapit GIS (RTK and Fix Types) has 0.01 to 0.03 m for 4, 0.1 to 0.3 for 5, below 0.3 for 3,
+#: 0.5 to 2 for 2, 2 to 5 for 1; nmea_navsat_driver of ROS takes 0.02 m for 4, 4 for 5 and 1. Float
+#: and precise solutions converge, hence more than the first. A position that the receiver
+#: estimates (6) is no better than an autonomous one; a manual or simulated one (7, 8) says nothing.
+USUAL_POSITION_SD = {4: 0.02, 5: 0.5, 3: 1.0, 2: 1.0, 1: 5.0, 6: 5.0}
 #: Typical accuracies of receivers, m and m/s.
 POSITION_SDS = "0.02 suits RTK, 1 a code receiver with corrections, 5 one without"
 VELOCITY_SDS = "0.05 suits RTK, 0.3 a code receiver by Doppler, 1 one that differences places"
@@ -68,11 +74,12 @@ class GnssOptions:
     #: up``); or the zone of UTM, with its hemisphere, of northings and eastings: ``33N``.
     origin: tuple[float, float, float] | str | None = None
     #: `position_sd`, `velocity_sd`: standard deviations north, east, down, or one for all three,
-    #: for each fix; they replace those of the file.
+    #: for each fix; they replace those of the file. Where it states none for positions, but kinds
+    #: of fix, a worse kind than that which `position_sd` suits has its usual one (`_by_quality`).
     position_sd: Sd | None = None
     velocity_sd: Sd | None = None
-    #: `unstated_position_sd`, `unstated_velocity_sd`: used where the file states none; `attrs` of
-    #: the table then has ``position_sd_taken``, ``velocity_sd_taken``.
+    #: `unstated_position_sd`, `unstated_velocity_sd`: used where the file states none, that of the
+    #: position at most; `attrs` of the table then has ``position_sd_taken``, ``velocity_sd_taken``.
     unstated_position_sd: float | None = None
     unstated_velocity_sd: float | None = None
     #: Steps of the receiver's clock, s, one after another: a stamp, and what is subtracted from it
@@ -131,7 +138,8 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     not stated, or as `gnss_table`.
     """
     count = fixes.time.size
-    asked, taken = options.position_sd, {}
+    asked: Sd | None = options.position_sd
+    taken: dict[str, float] = {}
     if fixes.position_sd is None and asked is None and options.unstated_position_sd is not None:
         asked = taken["position_sd_taken"] = options.unstated_position_sd
         if np.isinf(asked).all():
@@ -170,6 +178,9 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     if not keep.any():
         raise DataError("io.no-usable-fix", file=fixes.name, quantity="lat, lon")
     at = np.flatnonzero(keep)
+    if fixes.position_sd is None and fixes.quality is not None:
+        level = slice(2 if fixes.heights_from == NOWHERE else 3)
+        position_sd[at, level] = _by_quality(fixes, position_sd[at], quality[at], taken)[:, level]
     with told_by_file_rows(fixes.name, lambda row: int(fixes.rows[at[row]])):
         table = gnss_table(
             time[at],
@@ -357,6 +368,47 @@ def _velocity(fixes: Fixes, asked: Sd | None, count: int) -> tuple[Array, Array]
     sd = _sd(fixes, "velocity", asked, count)
     there = np.isfinite(fixes.velocity)
     return np.where(there, fixes.velocity, 0.0), np.where(there, sd, np.inf)
+
+
+def _by_quality(fixes: Fixes, sd: Array, quality: Array, taken: dict[str, float]) -> Array:
+    """Return standard deviations, (n, 3), of fixes whose kinds share one statement.
+
+    A statement is of the kind in the file whose usual standard deviation is nearest, by ratio: 0.02
+    is of the fixed solutions even where they are few, and says nothing of the others; 1.5 is of the
+    autonomous ones though some be fixed. Fixes of a worse kind have at least their usual one, with
+    the ratios of the components as stated; a better kind has no more than is stated. What is taken
+    for want of a statement is that of the best kind, so that the same number as a statement gives
+    each fix the same.
+    """
+    usual = np.full(len(sd), np.nan)
+    for kind, size in USUAL_POSITION_SD.items():
+        usual[quality == kind] = size
+    sizes, given = np.unique(usual[np.isfinite(usual)]), float(sd[0, :2].min())
+    if not sizes.size or not np.isfinite(given):
+        return sd
+    stated = given
+    if "position_sd_taken" in taken:
+        stated = taken["position_sd_taken"] = min(given, float(sizes[0]))
+        sd = np.full_like(sd, stated)
+    own = sizes[np.argmin(np.abs(np.log(sizes / stated)))]
+    worse = usual > own
+    sd = np.where(worse[:, None], sd * (usual / stated)[:, None], sd)
+    if worse.any() or stated < given:
+        kinds = [
+            Finding(
+                "io.sd-of-quality",
+                severity="note",
+                count=int(np.count_nonzero(quality == kind)),
+                kind=FIX_KINDS[kind],
+                quality_code=kind,
+                sd=float(sd[quality == kind][0, 0]),
+            )
+            for kind in FIX_KINDS
+            if (quality == kind).any()
+        ]
+        names = ", ".join(POSITION_SD)
+        add_note(fixes.findings, "io.sd-by-quality", file=fixes.name, quantity=names, kinds=kinds)
+    return sd
 
 
 def _without_sd(fixes: Fixes) -> Finding:

@@ -41,6 +41,7 @@ from strapdown.report.navigation_evaluation import Agreement, NavigationEvaluati
 from strapdown.report.values import NOT_ESTIMATED, plain
 from strapdown.tables import EULER, NED, POSITION_SD, VELOCITY
 from strapdown.tables.checks import height_words, index_of
+from strapdown.tables.gnss import FIX_KINDS
 from strapdown.tables.on_disk import stored
 
 TIME = "time, s"
@@ -507,10 +508,6 @@ def innovation_chart(
     return over_time(record, slug, title, caption, panels, statuses)
 
 
-#: Kinds of fix by the quality of NMEA 0183, from the best.
-_FIXES = {4: "fixed", 5: "float", 3: "precise", 2: "differential", 1: "autonomous", 6: "estimated"}
-
-
 def fix_charts(evaluation: NavigationEvaluation) -> tuple[Chart, ...]:
     """Kind, satellites and stated accuracy of the fixes of each receiver; none if all constant."""
     found = [
@@ -532,14 +529,14 @@ def _fix_chart(evaluation: NavigationEvaluation, aid: str, table: pd.DataFrame) 
 
     panels = []
     quality = column("quality")
-    kinds = [k for k in _FIXES if (quality == k).any()]
+    kinds = [k for k in FIX_KINDS if (quality == k).any()]
     if len(kinds) > 1:
         at = np.full(quality.size, np.nan)
         for row, kind in enumerate(kinds):
             at[quality == kind] = row
         rows = kept_rows((at,), BUCKETS)
         drawn = dots("fix", time[rows], at[rows], BLUE, "circle", 3.2)
-        names = tuple(_FIXES[k] for k in kinds)
+        names = tuple(FIX_KINDS[k] for k in kinds)
         panels.append(Panel("", (drawn,), categories=names, height=0.12 * len(names) + 0.05))
     if "satellites" in table and np.isfinite(satellites := column("satellites")).any():
         line = curve("satellites", time, satellites, GREEN, buckets=BUCKETS)

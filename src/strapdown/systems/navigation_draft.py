@@ -653,11 +653,15 @@ def _aids(
             if not any(made.gnss.attrs.get(taken) for taken, k in TAKEN.items() if k == key):
                 page.key(key, toml_value(aid[key]) or "")
             else:
+                best, kind = "", "each fix"
+                if key == "position_sd_m" and np.ptp(made.gnss[POSITION_SD[0]]):
+                    kind = "the best kind of fix"
+                    best = f"of {kind}, others have more; "
                 page.key(
                     key,
                     repr(aid[key]),
-                    f"assumed: the fixes do not state it; {usual}",
-                    check=f"standard deviation of the {what} of each fix: {usual}",
+                    f"assumed: the fixes do not state it; {best}{usual}",
+                    check=f"standard deviation of the {what} of {kind}: {usual}",
                 )
         arm = _arm(made.gnss) if aid["kind"] == "gnss" else ""
         options(page, slot.entries[aid["kind"]], aid, {"lever_arm_m": arm})

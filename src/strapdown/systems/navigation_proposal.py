@@ -23,6 +23,7 @@ from strapdown.errors import DataError, DivergenceError, Finding
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import open_fixes, read_gnss
+from strapdown.formats.gnss_fixes import USUAL_POSITION_SD
 from strapdown.formats.recording import Recording, as_stated
 from strapdown.frames import ways_between
 from strapdown.navigation.measurements.clock_windows import (
@@ -137,7 +138,7 @@ MOST_BACK, LEAST_BACK, MORE = 300.0, 60.0, 30.0
 #: receiver better than stated.
 RULE = {"kind": "adaptive", "influence": "igg3", "scale": {"lowest": 1.0}}
 #: Fixes without stated standard deviations: a code receiver without corrections, m and m/s.
-CODE_POSITION_SD, CODE_VELOCITY_SD = 5.0, 0.3
+CODE_POSITION_SD, CODE_VELOCITY_SD = USUAL_POSITION_SD[1], 0.3
 #: Standard deviation of the offset between receiver stamps and sensor clock, s: search range.
 OFFSET_SD = 0.2
 #: A significant delay of velocities is used beyond this time, s; an offset of stamps beyond so many
@@ -631,7 +632,8 @@ def first_motion(fixes: pd.DataFrame) -> tuple[int | None, float]:
     lat, lon, _ = np.radians(values_of(fixes, GEODETIC)).T
     sd = values_of(fixes, POSITION_SD)[:, :2].max(axis=1)
     scatter = white_position_sd(fixes) if "position_sd_taken" in fixes.attrs else None
-    if scatter is not None and scatter[0] < PHASE:
+    # Where a kind of fix says so, it has been taken for a phase solution.
+    if scatter is not None and scatter[0] < PHASE and sd.min() > FLOATING:
         sd = np.minimum(sd, FLOATING)
     steps = 1
     while steps < len(time):
@@ -748,7 +750,7 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
     Float solutions have errors of their own.
     """
     assumed = "position_sd_taken" in fixes.attrs
-    floats = None if assumed else float_position_sd(fixes)
+    floats = float_position_sd(fixes)
     if floats is not None:
         sd = np.square(values_of(fixes, POSITION_SD)[:, :2]).mean(axis=1)
         fixes = fixes[~(sd >= floats**2)]

@@ -38,6 +38,10 @@ GNSS = [*GEODETIC, *VELOCITY, *POSITION_SD, *VELOCITY_SD, "quality"]
 # Quality indicators of NMEA 0183 GGA: 0 no fix, 1 autonomous, 2 differential, 3 precise, 4 and 5
 # carrier phase, 6 estimated, 7 and 8 manual and simulated.
 QUALITIES = range(9)
+#: Kinds of fix by this quality, from the best.
+FIX_KINDS = {
+    4: "fixed", 5: "float", 3: "precise", 2: "differential", 1: "autonomous", 6: "estimated"
+}  # fmt: skip
 # A step between fixes defines a velocity where it exceeds the position uncertainty by this factor
 # and is faster than a standing receiver wanders.
 CLEAR = 5.0

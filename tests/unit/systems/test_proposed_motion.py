@@ -14,7 +14,7 @@ from strapdown.systems.navigation_proposal import (
     _rest,
     first_motion,
 )
-from strapdown.tables import ACCEL, gnss_table, imu_table
+from strapdown.tables import ACCEL, POSITION_SD, gnss_table, imu_table
 
 RATE = 10.0
 SD = 5.0
@@ -50,6 +50,16 @@ def test_a_rest_whose_places_scatter_is_no_drive():
     begins, fastest = first_motion(fixes(0.0, noise=SD))
     assert begins is None
     assert fastest <= 0.5
+
+
+def test_autonomous_fixes_among_fixed_solutions_are_no_drive():
+    """At rest: one of thirty is autonomous, and 2 m beside; 5 m are assumed of it, and not 0.3."""
+    table = fixes(0.0, noise=0.01)
+    autonomous = np.arange(len(table)) % 30 == 0
+    table[POSITION_SD] = np.tile(np.where(autonomous, 5.0, 0.02)[:, None], 3)
+    table.loc[autonomous, "lat"] += np.degrees(2.0 / 6.37e6)
+    table.attrs["position_sd_taken"] = 0.02
+    assert first_motion(table) == (None, pytest.approx(0.0, abs=0.5))
 
 
 def test_by_places_the_drive_is_fast_enough_for_a_course():

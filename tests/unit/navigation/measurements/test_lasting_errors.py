@@ -161,6 +161,9 @@ def test_float_solutions_are_told_by_what_they_state():
     table.loc[rows, POSITION_SD] = 0.5
     assert float_position_sd(table) == pytest.approx(0.1)
     assert _position_errors(table, 0.0)["float_position_sd_m"] == pytest.approx(0.1)
+    # So they are where kinds of fix say it, and no standard deviation is stated.
+    table.attrs["position_sd_taken"] = 0.02
+    assert _position_errors(table, 0.0)["float_position_sd_m"] == pytest.approx(0.1)
     # A code receiver states a metre or three.
     table[POSITION_SD] *= 60.0
     assert float_position_sd(table) is None
