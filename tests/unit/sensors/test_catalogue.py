@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -50,6 +52,53 @@ def test_every_number_has_a_source_or_says_why_it_is_assumed(name):
     for figure in load_sensor(name).sources:
         assert bool(figure.source) != bool(figure.assumed), figure.key
         assert len(figure.source or figure.assumed) > 10, figure.key
+
+
+REASON = re.compile(r"(as|near|between) ([a-z0-9-]+)(?: and ([a-z0-9-]+))?:")
+
+
+def sizes(name):
+    """Figures of a sensor by triad and quantity: values, and spreads as standard deviations, SI."""
+    table = tomllib.loads((catalogue.FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+    found = {}
+    for triad in {"gyro", "accel"} & set(table):
+        for key, figure in table[triad].items():
+            meaning = catalogue.KEYS[triad][key]
+            uniform = np.sqrt(3.0) if meaning.spread == "bound" else 1.0
+            size = np.asarray(figure["value"]) * meaning.factor / uniform
+            found[triad, meaning.quantity] = size, figure.get("assumed", "")
+    return found
+
+
+def test_an_assumed_figure_is_that_of_the_sensors_it_names():
+    """`as` is equal, `near` within a factor of two, `between` within both."""
+    held = 0
+    for name in SENSORS:
+        for place, (size, reason) in sizes(name).items():
+            told = REASON.match(reason)
+            if told is None:
+                continue
+            others = [sizes(other)[place][0] for other in told.groups()[1:] if other]
+            room = 2.0 if told[1] == "near" else 1.0
+            low, high = np.min(others, axis=0) / room, np.max(others, axis=0) * room
+            assert (len(others) == 2) == (told[1] == "between"), (name, place)
+            assert (low * (1 - 1e-9) <= size).all(), (name, place, size, low)
+            assert (size <= high * (1 + 1e-9)).all(), (name, place, size, high)
+            held += 1
+    assert held > 60
+
+
+def test_the_manual_says_how_many_figures_are_assumed():
+    """Of named sensors, by class; a grade is assumed throughout."""
+    page = Path(__file__).parents[3] / "docs" / "sensors.md"
+    told = re.findall(r"^\|`(\w+)`\|(\d+)\|(\d+)\|$", page.read_text(encoding="utf-8"), re.M)
+    counted = {}
+    for sensor in map(load_sensor, SENSORS):
+        if not sensor.name.endswith("-grade"):
+            figures, assumed = counted.get(sensor.grade, (0, 0))
+            more = sum(bool(f.assumed) for f in sensor.sources)
+            counted[sensor.grade] = figures + len(sensor.sources), assumed + more
+    assert {grade: (int(n), int(m)) for grade, n, m in told} == counted
 
 
 @pytest.mark.parametrize("name", SENSORS)
