@@ -30,7 +30,7 @@ from strapdown.config.navigation import (
 )
 from strapdown.constants import Triple
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
-from strapdown.errors import DivergenceError, Finding, StrapdownError, add_note
+from strapdown.errors import DataError, DivergenceError, Finding, StrapdownError, add_note
 from strapdown.estimation.robust import DOUBT
 from strapdown.evaluation.trajectory_differences import (
     DifferenceSummary,
@@ -401,15 +401,21 @@ def _turns(euler: NDArray[np.float64]) -> NDArray[np.float64]:
 def _with_settled_offsets(
     chain: NavigationPipeline, run: PipelineRun, drive: Callable[[NavigationPipeline], PipelineRun]
 ) -> tuple[NavigationPipeline, PipelineRun, tuple[Finding, ...]]:
-    """Repeat a run with the time offsets that it estimates until these are small."""
+    """Repeat a run with the time offsets that it estimates until these are small.
+
+    One with which there is no run, as no fix is left within the alignment, is not known.
+    """
     findings: tuple[Finding, ...] = ()
     before: dict[str, tuple[float, float]] = {}
-    for _ in range(STEPS_OF_OFFSET):
-        chain, by_step = _with_offsets(chain, run.smoothed or run.record, before)
-        if not by_step:
-            return chain, run, findings
-        findings, run = by_step, drive(chain)
-    _, left = _with_offsets(chain, run.smoothed or run.record, before)
+    for step in range(STEPS_OF_OFFSET + 1):
+        other, left = _with_offsets(chain, run.smoothed or run.record, before)
+        if not left or step == STEPS_OF_OFFSET:
+            break
+        try:
+            run = drive(other)
+        except (DataError, DivergenceError):
+            break
+        chain, findings = other, left
     code = "navigation.offset-not-settled"
     names = [str(one.quantity) for one in left]
     unsettled = (Finding(code, quantity=name, left=before[name][1]) for name in names)

@@ -10,6 +10,7 @@ import pytest
 from tests import town_drive as town
 
 from strapdown.dsp.chi_square import plane_bound
+from strapdown.errors import DataError
 from strapdown.estimation.robust import HUBER, AdaptiveRule, AdaptiveScale, Igg3
 from strapdown.frames import geodetic_from_ned
 from strapdown.navigation.heading_checks import _known
@@ -400,3 +401,22 @@ def test_runs_are_repeated_until_the_offset_they_find_is_small(part, runs):
     else:
         assert codes[-1] == "navigation.offset-not-settled"
         assert findings[-1].data["left"] == 0.3
+
+
+def test_an_offset_with_which_there_is_no_run_is_not_used():
+    """As one by which no fix is left within the alignment."""
+    navigator, _ = town.begun(town.gnss(time_offset_sd=0.2))
+    chain, name = SimpleChain(navigator), "gnss.time_offset_t"
+    record = SimpleNamespace(
+        sensors=pd.DataFrame({name: [1.3]}), sensors_sd=pd.DataFrame({name: [0.04]})
+    )
+    first = SimpleNamespace(smoothed=None, record=record)
+
+    def drive(chain):
+        raise DataError("navigation.no-position-for-alignment", quantity="site", time=2.0)
+
+    after, run, (finding,) = _with_settled_offsets(chain, first, drive)
+    assert after is chain
+    assert run is first
+    assert finding.code == "navigation.offset-not-settled"
+    assert finding.data["left"] == 1.3
