@@ -41,8 +41,9 @@ NEAR, FEWEST = 2, 5
 ALIKE = 0.5
 #: Float solutions: their scatter from fix to fix, and what separates them from fixed ones, in
 #: standard deviations of a step of the latter, as first supposed; times the stated standard
-#: deviation that they are at least. They begin and end once in so long, s.
-FLOATS, APART, LARGER = 4.0, 30.0, 3.0
+#: deviation that they are at least, and that stated ones are where it is too small. They begin and
+#: end once in so long, s.
+FLOATS, APART, LARGER, UNDERSTATED = 4.0, 30.0, 3.0, 1.5
 BEGINS, ENDS = 60.0, 10.0
 #: Quality of a float solution in NMEA 0183 GGA.
 FLOAT = 5
@@ -202,13 +203,13 @@ def displaced_stretches(
 def stated_floats(
     record: NavigationRecord, table: pd.DataFrame, aid: Gnss
 ) -> tuple[pd.DataFrame, Gnss] | None:
-    """State the float solutions of a receiver whose fixes do not, by how they move.
+    """State the float solutions of a receiver that does not, or understates them, by their motion.
 
     A receiver that loses its carrier-phase ambiguities jumps to a position with an error of another
     order of magnitude, which wanders until it fixes them again, and jumps back. What positions
     moved beyond the motion of the solution is then of three sizes: between fixed solutions, between
-    float ones, and from one to the other. The chances of the two kinds (forward and backward:
-    Rabiner 1989, Proc. IEEE 77) and their sizes are found in turn.
+    float ones, and from one to the other. Where it is not stated which is which, the chances of the
+    two kinds (forward and backward: Rabiner 1989, Proc. IEEE 77) and the sizes are found in turn.
 
     Parameters
     ----------
@@ -220,37 +221,59 @@ def stated_floats(
     table : DataFrame
         With the standard deviations and the quality of float solutions, where they are.
     aid : Gnss
-        With the `float_position_sd` that separates them. None where there are none.
+        With the `float_position_sd` that separates them. None where there are none, or as stated.
     """
     rows, at, steps, stated = _steps(record, table, aid)
-    if len(rows) < 4 * BESIDE or aid.float_position_sd:
+    if len(rows) < 4 * BESIDE:
         return None
     usual = np.maximum(MAD_TO_SD * np.median(np.abs(steps), axis=0), TINY)
     square = np.square(steps / usual).sum(axis=1)
     square[[gap.sample - 1 for gap in find_gaps(at)]] = np.nan  # says nothing
+    own = values_of(table, POSITION_SD)[rows]
+    level = np.sqrt(np.mean(np.square(own[:, :2]), axis=1))
+    limit = aid.float_position_sd
+    if limit:
+        floats = level >= limit
+        between = square[floats[1:] != floats[:-1]]
+        if np.isfinite(between).sum() < FEWEST:
+            return None
+        apart = math.sqrt(np.nanmedian(between) / CHI_MEDIAN)
+        known = np.median(aid.position_sd_factor * own[floats], axis=0)
+        larger = own[floats] * float(np.median(apart * usual / known))
+        if (larger < UNDERSTATED * own[floats]).any():
+            return None
+    else:
+        floats, sd = _floats(square, np.diff(at), usual)
+        if not 0.0 < floats.mean() <= MOST or (sd < LARGER * np.median(stated, axis=0)).any():
+            return None
+        larger = np.maximum(own[floats], sd / aid.position_sd_factor)
+        limit = math.sqrt(float(np.median(level)) * math.hypot(*larger[0, :2] / math.sqrt(2.0)))
+    out = table.copy()
+    where = table.columns.get_indexer(pd.Index([*POSITION_SD, "quality"]))
+    out.iloc[rows[floats], where] = np.column_stack([larger, np.full(len(larger), FLOAT)])
+    return out, replace(aid, float_position_sd=limit)
+
+
+def _floats(square: Array, dt: Array, usual: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Float solutions by the steps between all, (n,), and their standard deviations, (3,), m.
+
+    `square`, `dt`: as of `_chance_of_floats`. `usual`: a step between fixed solutions, (3,), m.
+    """
     looser, apart = FLOATS, APART
-    floats = np.zeros(len(rows), dtype=np.bool_)
+    floats = np.zeros(len(dt) + 1, dtype=np.bool_)
+    chance = floats.astype(np.float64)
     for _ in range(PASSES):
-        chance = _chance_of_floats(square, np.diff(at), looser, apart)
+        chance = _chance_of_floats(square, dt, looser, apart)
         before, floats = floats, chance > 0.5
         if (floats == before).all():
             break
         within = square[floats[1:] & floats[:-1]]
         between = square[floats[1:] != floats[:-1]]
         if len(within) < FEWEST or len(between) < 2:
-            return None
+            return np.zeros_like(floats), usual
         looser, apart = (math.sqrt(np.nanmedian(each) / CHI_MEDIAN) for each in (within, between))
     # A fixed solution that is taken for a float one costs little.
-    sd, floats = apart * usual, chance > UNLIKELY
-    if not 0.0 < floats.mean() <= MOST or (sd < LARGER * np.median(stated, axis=0)).any():
-        return None
-    out = table.copy()
-    where = table.columns.get_indexer(pd.Index([*POSITION_SD, "quality"]))
-    larger = np.maximum(values_of(table, POSITION_SD)[rows[floats]], sd / aid.position_sd_factor)
-    out.iloc[rows[floats], where] = np.column_stack([larger, np.full(len(larger), FLOAT)])
-    limit = np.median(np.hypot(*values_of(table, POSITION_SD)[rows, :2].T))
-    limit = math.sqrt(0.5 * limit * math.hypot(*sd[:2]) / aid.position_sd_factor)
-    return out, replace(aid, float_position_sd=limit)
+    return np.asarray(chance > UNLIKELY), apart * usual
 
 
 def _chance_of_floats(square: Array, dt: Array, looser: float, apart: float) -> Array:

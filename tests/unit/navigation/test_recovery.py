@@ -546,3 +546,27 @@ def test_float_solutions_that_nothing_states_do_not_pull_the_solution():
         ratios.append(np.sqrt(np.mean(after**2) / np.mean(before**2)))
     assert max(ratios) < 0.6
     assert np.median(ratios) < 0.25
+
+
+@pytest.mark.parametrize("part", [0.25, 0.5, 1.0])
+def test_float_solutions_that_are_understated_are_stated_by_how_they_jump(part):
+    """By what part they state; as stated they are left, and so are a few that say little."""
+    sizes = []
+    for seed in range(10):
+        table, loose = carrier_phase(seed, *LOOSE)
+        table.loc[loose, POSITION_SD] = part * FLOAT_SD
+        aid = town.gnss(float_position_sd=2.0 * FIXED_SD)
+        found = stated_floats(solution(), table, aid)
+        if part == 1.0:
+            assert found is None
+            continue
+        out, same = found
+        assert same == aid
+        assert stated_floats(solution(), out, same) is None
+        pd.testing.assert_frame_equal(out[~loose], table[~loose])
+        sizes.append(out.loc[loose, POSITION_SD].iloc[0].to_numpy() / FLOAT_SD)
+    # Ten changes of three components each: 0.18 of the logarithm of one.
+    assert np.abs(np.log(sizes)).max(initial=0.0) < 3.0 * 0.18
+    table, loose = carrier_phase(0, LOOSE[0], LOOSE[2])
+    table.loc[loose, POSITION_SD] = part * FLOAT_SD
+    assert stated_floats(solution(), table, aid) is None
