@@ -19,7 +19,7 @@ from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.logs import FixesTable, LogTable
 from strapdown.config.navigation import STAGES
 from strapdown.config.toml_text import ASK, Draft, Offered, Page, inline, named_from, string
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
 from strapdown.dsp.samples import true_runs, white_sd
 from strapdown.earth import FIRST_YEAR, LAST_YEAR, THIS_YEAR, magnetic_field
 from strapdown.errors import DataError, Finding
@@ -65,7 +65,7 @@ GUSTS, OF_DYNAMIC, WEATHER = 0.5, 0.1, 30.0
 MEAN = 1.0
 #: Error of a heading of two antennas by reflected signals, deg, where no standard deviation is
 #: stated, and how long it lasts, s.
-REFLECTED, MINUTE = 0.3, 20.0
+REFLECTED, LASTS = 0.3, 20.0
 #: Errors of the angle of a baseline, deg: of the mounting of the unit in the vehicle, whose course
 #: shows the angle, as of an alignment by the course; and of an angle that a person states.
 MOUNTED, STATED_ANGLE = 5.0, 2.0
@@ -207,9 +207,10 @@ def _of_antennas(
     out: dict[str, Any] = {"kind": Heading.kind, "path": path}
     if HEADING[1] not in read_stream(path, Heading.stream):
         step = float(np.median(np.diff(index_of(table))))
-        heading = np.unwrap(values_of(table, HEADING[:1]), period=360.0, axis=0)
-        lasting = REFLECTED * math.sqrt(longer_by(step, MINUTE))
-        size = math.hypot(float(white_sd(heading)[0]), lasting)
+        heading = np.unwrap(values_of(table, HEADING[:1])[:, 0], period=360.0)
+        # As `white_sd`, by the median: what changes is mostly the vehicle's heading, in turns.
+        scatter = MAD_TO_SD * float(np.median(np.abs(np.diff(heading, n=2)))) / math.sqrt(6.0)
+        size = math.hypot(scatter, REFLECTED * math.sqrt(longer_by(step, LASTS)))
         out["heading_sd_deg"] = float(f"{size:.2g}")
     angle = None if fixes is None else baseline_angle(table, fixes)
     if angle is None:

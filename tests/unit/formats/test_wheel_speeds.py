@@ -53,6 +53,8 @@ def test_a_column_that_says_wheel_or_vehicle_and_a_unit(tmp_path, name, factor):
     np.testing.assert_allclose(recording.wheel, SPEED * factor, rtol=1e-14)
     assert "io.wheel-speed-of" in codes(recording)
     assert "io.columns-not-used" not in codes(recording)
+    (shown,) = sd.doctor(tmp_path / "drive.csv").data["logs"]
+    assert [(s["name"], s["rows"]) for s in shown["streams"]] == [("imu", COUNT), ("wheel", COUNT)]
     read = sd.read(tmp_path / "drive.csv")
     np.testing.assert_allclose(read["wheel"]["speed"], SPEED * factor, rtol=1e-14)
 
@@ -65,7 +67,10 @@ def test_a_unit_is_never_guessed(tmp_path, name):
     assert (found.severity, found.data["names"]) == ("warning", (name,))
 
 
-@pytest.mark.parametrize("name", ["speed_kmh", "gps_speed_kmh", "wheel_speed_rpm", "wheel_speed_rl_kmh"])
+OTHERS = ["speed_kmh", "gps_speed_kmh", "wheel_speed_rpm", "rl_wheel_speed_kmh"]
+
+
+@pytest.mark.parametrize("name", OTHERS)
 def test_a_speed_that_may_be_another_is_left(tmp_path, name):
     recording = read_log(log(tmp_path, {name: SPEED}))
     assert recording.wheel is None
@@ -73,7 +78,8 @@ def test_a_speed_that_may_be_another_is_left(tmp_path, name):
 
 
 def test_of_four_wheels_those_in_the_rear(tmp_path):
-    names = ("wheel_speed_fl_kmh", "wheel_speed_fr_kmh", "WheelSpeedRL [km/h]", "rr_wheel_speed_mps")
+    names = ("wheel_speed_fl_kmh", "wheel_speed_fr_kmh")
+    names += ("WheelSpeedRL [km/h]", "rr_wheel_speed_mps")
     four = dict(zip(names, (SPEED * 9.0, SPEED * 8.0, 3.6 * SPEED, SPEED + 2.0), strict=True))
     recording = read_log(log(tmp_path, {"vehicle_speed_kmh": 0.0 * SPEED, **four}))
     np.testing.assert_allclose(recording.wheel, SPEED + 1.0, rtol=1e-14)
