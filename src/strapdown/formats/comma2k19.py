@@ -25,6 +25,7 @@ from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.join import join
 from strapdown.formats.recording import NoStreamError, RawLog, TruthInSensorAxes
 from strapdown.formats.signs import Signs
+from strapdown.formats.wheel_columns import say_wheels
 from strapdown.tables.checks import Array
 
 POSES = ("global_pose", "global_pos")
@@ -232,8 +233,7 @@ def read_wheel(path: Path) -> RawLog:
         )
     speed = np.asarray(values[:, used], dtype=np.float64).mean(axis=1)
     raw = RawLog.of(path, {"time": (time, "s"), "speed": (speed, "m/s")}, clock=RELATIVE)
-    names = ["rear left", "rear right"] if used.stop == 4 else [kind]
-    add_note(raw.findings, "io.wheel-speed-of", file=name, quantity="speed", names=names)
+    say_wheels(raw.findings, name, ("rear left", "rear right") if used.stop == 4 else (kind,))
     return dataclasses.replace(raw, files=files)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import Finding
+from strapdown.errors import Finding, add_note
 from strapdown.formats.columns import read_name
 from strapdown.formats.recording import RawLog
 from strapdown.formats.vocabularies import Quantity, Vocabulary
@@ -77,12 +77,17 @@ def wheel_speed(
     ]
     speed = np.mean(block, axis=0)
     new = _new(speed)
-    note = Finding(
-        "io.wheel-speed-of", severity="note", file=raw.name, quantity="speed", names=names
-    )
-    findings.append(note)
+    say_wheels(findings, raw.name, names)
     index = pd.Index(np.asarray(time)[new], name="time")
     return pd.Series(speed[new], index=index, name=", ".join(names))
+
+
+def say_wheels(findings: list[Finding], file: str, names: tuple[str, ...]) -> None:
+    """Add a note on the wheels, or the column, whose speed is used."""
+    if len(names) > 1:
+        add_note(findings, "io.wheel-speed-mean", file=file, quantity="speed", names=names)
+    else:
+        add_note(findings, "io.wheel-speed-of", file=file, quantity="speed", name=names[0])
 
 
 def _unit(raw: RawLog, name: str) -> str | None:

@@ -72,6 +72,8 @@ MOUNTED, STATED_ANGLE = 5.0, 2.0
 #: Error of a wheel's speed by slip, a bus that is late, and a lever arm that nobody stated, m/s,
 #: and how long it lasts, s.
 SLIP, TURN = 0.3, 2.0
+#: Speed up to which a vehicle may go backwards, m/s: many buses have no sign.
+BACKWARDS = 3.0
 #: Differences of the Earth's field, as a share of its strength and in dip, deg, that show iron: of
 #: hard iron that turns a heading by about as much.
 WEAK, DIP = 0.15, 8.0
@@ -194,6 +196,8 @@ def propose_aids(
         own = {"height_sd_m": size, "interval_s": MEAN}
         if not isinstance(aid, Barometer):
             own = {"speed_sd_m_per_s": size}
+            if (values_of(table, aid.columns[:1]) >= 0.0).all():
+                own["least_speed_m_per_s"] = BACKWARDS
         stated = {key: float(f"{x:.2g}") for key, x in own.items()}
         where = {} if of_columns else {"path": path}
         tables[aid.kind] = {"kind": aid.kind, **where, **stated}
@@ -777,6 +781,8 @@ def _why(aid: Mapping[str, Any], made: Proposal) -> str:
         "Found in the recording. The standard deviation of a row: its scatter, and errors that "
         f"last: {LASTING_ERRORS[aid['kind']]}."
     )
+    if "least_speed_m_per_s" in aid:
+        said += " No speed is negative: slower ones may be of driving backwards, and are not used."
     if aid["kind"] != Heading.kind:
         return said
     if "heading_sd_deg" not in aid:

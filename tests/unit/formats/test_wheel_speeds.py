@@ -106,11 +106,16 @@ def test_the_columns_are_proposed_and_used_without_a_file(tmp_path):
     tables, _ = propose_aids(LogTable(path=str(path)), recording.imu, None, recording=recording)
     assert set(tables) == {"odometer"}
     # Slip of 0.3 m/s over 2 s, in rows of 20 ms: more than 0.3 m/s by the square root of 200.
-    assert tables["odometer"] == {"kind": "odometer", "speed_sd_m_per_s": 4.2}
+    expected = {"kind": "odometer", "speed_sd_m_per_s": 4.2, "least_speed_m_per_s": 3.0}
+    assert tables["odometer"] == expected
     given = Kinds("aiding", base=AidSpec)(tables["odometer"])
     table = of_samples(given, recording.imu, recording)
     np.testing.assert_allclose(table["speed"], SPEED, rtol=1e-14)
     assert (table["speed_sd"] == 4.2).all()
+    # One that goes below zero has a sign, and is used at any speed.
+    signed = read_log(log(tmp_path, {"wheel_speed_kmh": 3.6 * (SPEED - 11.0)}))
+    tables, _ = propose_aids(LogTable(path=str(path)), signed.imu, None, recording=signed)
+    assert tables["odometer"] == {"kind": "odometer", "speed_sd_m_per_s": 4.2}
     with pytest.raises(DataError, check=coded("navigation.aid-without-sd")):
         of_samples(given.model_copy(update={"speed_sd_m_per_s": 0.0}), recording.imu, recording)
     bare = read_log(log(tmp_path, {}))
@@ -149,7 +154,7 @@ def test_rear_wheels_of_a_segment(tmp_path, kind, flat):
     np.testing.assert_array_equal(table.index, 46_408.0 + np.arange(40) / 80.0)
     np.testing.assert_allclose(table["speed"], 0.5 * (FOUR[:, 2] + FOUR[:, 3]), rtol=1e-15)
     (said,) = table.attrs["findings"]
-    assert (said.code, said.data["names"]) == ("io.wheel-speed-of", ("rear left", "rear right"))
+    assert (said.code, said.data["names"]) == ("io.wheel-speed-mean", ("rear left", "rear right"))
     assert len([f for f in files_of(folder) if "wheel" in str(f)]) == 2
 
 
