@@ -29,6 +29,7 @@ from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats import holds
 from strapdown.formats.aid_table import read_stream
+from strapdown.formats.clocks import CLOCK
 from strapdown.formats.gnss_files import read_gnss as read_gnss_table
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import ABSENT as ABSENT
@@ -64,6 +65,8 @@ class ImuFile:
                 recording.truth[QUATERNION].to_numpy(),
                 np.asarray(recording.truth.index, dtype=np.float64),
             )
+        if recording.wheel is not None:
+            imu.attrs["wheel"] = (recording.wheel.to_numpy(), recording.wheel.index.to_numpy())
         imu.attrs["file"] = (self, _digest(imu))
         return imu
 
@@ -417,9 +420,9 @@ def read(path: str | Path, **options: Any) -> Streams:
     -------
     Streams
         ``imu``; ``gnss``, if it has fixes; ``reference``, an Attitude table of a log with a truth,
-        or a Trajectory; ``magnetometer``, ``barometer`` and ``wheel``, where they are apart from
-        the inertial sensors: ``mag_x mag_y mag_z`` in µT along the sensor's own axes, ``pressure``
-        in Pa, ``speed`` in m/s.
+        or a Trajectory; ``magnetometer``, ``barometer``, ``wheel`` and ``heading`` (of two
+        antennas), where they are apart from the inertial sensors: ``mag_x mag_y mag_z`` in µT along
+        the sensor's own axes, ``pressure`` in Pa, ``speed`` in m/s, ``heading heading_sd`` in deg.
 
     Raises
     ------
@@ -436,7 +439,8 @@ def read(path: str | Path, **options: Any) -> Streams:
 
     tables: dict[str, pd.DataFrame] = {}
     refused: dict[str, StrapdownError] = {}
-    others = [s for s in ("magnetometer", "barometer", "wheel") if holds(Path(path), s)]
+    beside = ("magnetometer", "barometer", "wheel", "heading")
+    others = [s for s in beside if holds(Path(path), s)]
     readers: dict[str, Callable[[str | Path], pd.DataFrame]] = {
         "imu": partial(read_imu, **options),
         "gnss": fixes,
@@ -454,6 +458,12 @@ def read(path: str | Path, **options: Any) -> Streams:
         if "reference" in tables[stream].attrs:
             q_nb, stamps = tables[stream].attrs["reference"]
             tables["reference"] = attitude_table(stamps, q_nb)
+        if "wheel" in tables[stream].attrs:
+            speed, stamps = tables[stream].attrs["wheel"]
+            wheel = pd.DataFrame({"speed": speed}, index=pd.Index(stamps, name="time"))
+            said = tables[stream].attrs
+            wheel.attrs = {k: said[k] for k in ("source", *CLOCK) if k in said}
+            tables["wheel"] = wheel
     if not tables:
         # A missing stream is not a fault: report the fault of a stream that the file has.
         raised = refused.values()

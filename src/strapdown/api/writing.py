@@ -26,7 +26,15 @@ from strapdown.errors import (
     check_choice,
 )
 from strapdown.formats import STREAMS, open_stream
-from strapdown.formats.clocks import RELATIVE, Clock, clock_of, own_ns, read_stamps, with_clock
+from strapdown.formats.clocks import (
+    CLOCK,
+    RELATIVE,
+    Clock,
+    clock_of,
+    own_ns,
+    read_stamps,
+    with_clock,
+)
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.recording import ABSENT, NoStreamError, RawLog
@@ -34,7 +42,7 @@ from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.formats.writers import FileOptions, find_writer, write_streams
 from strapdown.tables import GYRO, QUATERNION, attitude_table
 from strapdown.tables.checks import GEODETIC, MAG, POSITION_SD
-from strapdown.units import MAG_UNITS, PRESSURES, SPEEDS, TIME_UNITS, factor_of
+from strapdown.units import ANGLES, MAG_UNITS, PRESSURES, SPEEDS, TIME_UNITS, factor_of
 
 #: A column that identifies the stream of a table, in the order of the tests.
 _TELLS = (
@@ -45,6 +53,7 @@ _TELLS = (
     (MAG[0], "magnetometer"),
     ("pressure", "barometer"),
     ("speed", "wheel"),
+    ("heading", "heading"),
 )
 
 
@@ -65,7 +74,7 @@ def write(
     data : Streams, mapping of str to DataFrame, or DataFrame
         As of `read`, `read_imu`, `read_gnss`, `read_trajectory`, or the trajectory of a run. A
         mapping names streams: ``imu``, ``gnss``, ``reference``, ``magnetometer``, ``barometer``,
-        ``wheel``.
+        ``wheel``, ``heading``.
     path : str or Path
         A file, or a folder for formats of several files.
     format : str, optional
@@ -155,7 +164,7 @@ def read_streams(
     if "reference" not in tables and "imu" in tables and "reference" in tables["imu"].attrs:
         q_nb, stamps = tables["imu"].attrs["reference"]
         truth = attitude_table(stamps, q_nb, tables["imu"].attrs.get("source"))
-        truth.attrs |= {k: v for k, v in tables["imu"].attrs.items() if k in _CLOCK}
+        truth.attrs |= {k: v for k, v in tables["imu"].attrs.items() if k in CLOCK}
         tables["reference"] = truth
     if not tables:
         raise absent[0] if absent else DataError("io.no-stream-at-all", file=str(paths[0]))
@@ -164,9 +173,6 @@ def read_streams(
         tables = _cut(tables, part, findings)
     ordered = {name: tables[name] for name in STREAMS if name in tables}
     return Streams(ordered, paths[0].name), findings
-
-
-_CLOCK = ("clock", "clock_origin", "clock_origin_stamp", "gps_week")
 
 
 def _parts(path: Path) -> dict[str, Path]:
@@ -221,11 +227,12 @@ _BESIDE: dict[str, tuple[tuple[str, ...], Mapping[str, float], str]] = {
     "magnetometer": (tuple(MAG), MAG_UNITS, "uT"),
     "barometer": (("pressure",), PRESSURES, "Pa"),
     "wheel": (("speed",), SPEEDS, "m/s"),
+    "heading": (("heading", "heading_sd"), ANGLES, "deg"),
 }
 
 
 def _beside(path: Path, stream: str, form: str | None, axes: str | None) -> pd.DataFrame:
-    """Read a magnetometer (body axes, µT), a barometer (Pa) or a wheel (m/s).
+    """Read a magnetometer (body axes, µT), a barometer (Pa), a wheel (m/s) or a heading (deg).
 
     Only formats that state what each column is have such a stream. Rows without a number, and
     those not later than the row before, are left out.
@@ -233,6 +240,7 @@ def _beside(path: Path, stream: str, form: str | None, axes: str | None) -> pd.D
     raw = open_stream(path, stream, form)
     names, units, unit = _BESIDE[stream]
     of = {quantity: column for column, (quantity, _) in getattr(raw, "stated", {}).items()}
+    names = tuple(n for n in names if n in of or not n.endswith("_sd"))
     if not isinstance(raw, RawLog) or not {"time", *names} <= of.keys():
         raise NoStreamError(path.name, stream, "table", [])
     block = np.column_stack([raw.columns[of[n]].astype(np.float64) for n in names])

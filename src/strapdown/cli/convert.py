@@ -43,7 +43,7 @@ class TargetFlags:
     ] = None
     streams: Annotated[
         str | None,
-        writing("NAMES", "Only these: imu,gnss,reference,magnetometer,barometer,wheel."),
+        writing("NAMES", "Only these: imu,gnss,reference,magnetometer,barometer,wheel,heading."),
     ] = None
     epoch: Annotated[
         str | None,

@@ -96,7 +96,7 @@ __all__ = [
 #: Raw content of a stream: columns, fixes in the units of a Gnss table, or a Trajectory table.
 Raw = RawLog | Fixes | pd.DataFrame
 #: Names of streams, in the order in which they are shown.
-STREAMS = ("imu", "gnss", "reference", "magnetometer", "barometer", "wheel")
+STREAMS = ("imu", "gnss", "reference", "magnetometer", "barometer", "wheel", "heading")
 #: In `Reader.streams`: one table of named columns, which hold any of `STREAMS`.
 TABLE = "table"
 #: Function of a module that reads each.
@@ -232,7 +232,9 @@ READERS: dict[str, Reader] = {
     "tum": Reader(tum.TITLE, tum.detect, {"reference": tum.read}),
     "rtklib": Reader("solution of RTKLIB (.pos)", gnss_pos.detect, {"gnss": gnss_pos.read}),
     "nmea": Reader(
-        "NMEA 0183: GGA, RMC, VTG, ZDA, GST", gnss_nmea.detect, {"gnss": gnss_nmea.read}
+        gnss_nmea.TITLE,
+        gnss_nmea.detect,
+        {"gnss": gnss_nmea.read, "heading": gnss_nmea.read_heading},
     ),
     "kf-gins": Reader(
         "KF-GINS increments, seven columns without a header", kf_gins.detect, {"imu": kf_gins.read}

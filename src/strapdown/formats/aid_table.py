@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strapdown.errors import ConfigError, DataError, Finding, add_note
 from strapdown.formats import csv, data_sets, holds, open_stream, read_raw, reader_of, table_files
 from strapdown.formats.arrays import ticks_of
-from strapdown.formats.clocks import GPS, RELATIVE, Clock, on_clock_of, unrolled, with_clock
+from strapdown.formats.clocks import CLOCK, GPS, RELATIVE, Clock, on_clock_of, unrolled, with_clock
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.find_columns import find_quantities
 from strapdown.formats.recording import NoStreamError, RawLog, Recording
@@ -45,7 +45,10 @@ UNITS: dict[str, Mapping[str, float]] = {
 }
 #: Synonyms of a column, without blanks and underscores. Those of opposite sign are excluded.
 SYNONYMS: dict[str, tuple[str, ...]] = {
-    "speed": ("velocity", "vel", "v", "wheelspeed", "vehiclespeed", "odometerspeed", "odospeed"),
+    "speed": (
+        *("velocity", "vel", "v", "wheelspeed", "vehiclespeed", "odometerspeed", "odospeed"),
+        *("obdspeed", "canspeed", "carspeed"),
+    ),
     "distance": ("odometer", "odo", "mileage", "way"),
     "pulses": ("pulse", "ticks", "counts", "count"),
     "alt": ("altitude", "height", "h", "baroaltitude", "baroheight", "hbaro"),
@@ -113,9 +116,10 @@ def read_aid_table(
             missing_2=missing[0],
         )
     findings = list(raw.findings)
-    time, clock, _ = found["time"].stamps(raw)
-    if clock in (GPS, RELATIVE) and np.isfinite(time).all():
+    time, name, _ = found["time"].stamps(raw)
+    if name in (GPS, RELATIVE) and np.isfinite(time).all():
         time, _ = unrolled(time)
+    clock = _clock(raw, name)
     there = [name for name in columns if name in found]
     values = {name: found[name].values(raw, name) for name in there}
     for name, unit in columns.items():
@@ -130,7 +134,13 @@ def read_aid_table(
     first, last = raw.row(int(rows[0])), raw.row(int(rows[-1]))
     table.attrs |= {"source": raw.name, "findings": tuple(findings), "axes": raw.axes}
     table.attrs["first_row"] = first if last - first == len(rows) - 1 else None
-    return with_clock(table, Clock(clock))
+    return with_clock(table, clock)
+
+
+def _clock(raw: RawLog, name: str) -> Clock:
+    """Clock of stamps, with the GPS week of the first if the file states it."""
+    source = next((c for c, (q, _) in raw.stated.items() if q == "week"), None)
+    return Clock(name, week=None if source is None else int(raw.columns[source][0]))
 
 
 #: Units of the quantities of other sensors, with the one that a table has.
@@ -139,6 +149,8 @@ _STREAM_UNITS = {
     "pressure": (PRESSURES, "Pa"),
     "speed": (SPEEDS, "m/s"),
     "height": (LENGTHS, "m"),
+    "heading": (ANGLES, "deg"),
+    "baseline": (LENGTHS, "m"),
 }
 
 
@@ -168,6 +180,15 @@ def temperature_of(recording: Recording, path: str | Path, form: str | None) -> 
     return found if found is not None and len(found) > 1 else None
 
 
+def wheel_table(recording: Recording) -> pd.DataFrame:
+    """Speed of the wheels in columns of a log, m/s, on the clock of its samples."""
+    assert recording.wheel is not None  # asked before
+    table = recording.wheel.to_frame("speed")
+    table.attrs = {k: recording.imu.attrs[k] for k in CLOCK if k in recording.imu.attrs}
+    table.attrs |= {"source": recording.name, "findings": (), "units": {"speed": "m/s"}}
+    return table
+
+
 def but_temperature(findings: Iterable[Finding], recording: Recording) -> Iterator[Finding]:
     """Findings, of which the one about columns without a use does not list the temperature."""
     used = None if recording.temperature is None else str(recording.temperature.name)
@@ -179,11 +200,12 @@ def but_temperature(findings: Iterable[Finding], recording: Recording) -> Iterat
 
 
 def read_stream(path: str | Path, stream: str, form: str | None = None) -> pd.DataFrame:
-    """Read a stream of another sensor: ``magnetometer``, ``barometer`` or ``wheel``.
+    """Read a stream of another sensor: ``magnetometer``, ``barometer``, ``wheel`` or ``heading``.
 
     `path`, `stream`, `form`: as `open_stream`. Returns indexed by ``time`` s, on the file's clock,
     with what the file states: ``mag_x mag_y mag_z`` in µT, ``pressure`` in Pa, ``speed`` in m/s,
-    ``temperature`` in °C; along the sensor's own axes. ``attrs`` has the clock, ``source``,
+    ``heading heading_sd`` in deg, ``baseline`` in m, ``temperature`` in °C; along the sensor's own
+    axes. ``attrs`` has the clock, ``source``,
     ``findings``, and ``units`` by column. NoStreamError: the recording does not have it.
     DataError: it has no stamps, or as `open_stream`.
     """
@@ -197,6 +219,10 @@ def read_stream(path: str | Path, stream: str, form: str | None = None) -> pd.Da
     ticks, dated = ticks_of(raw, name, unit)
     time = np.asarray(ticks * (1e-9 if dated else TIME_UNITS.get(unit or "s", 1.0)), np.float64)
     values, units = {}, {}
+    clock = _clock(raw, raw.clock or RELATIVE)
+    if clock.name == GPS and np.isfinite(time).all():
+        time, _ = unrolled(time)
+    stated.pop("week", None)
     for quantity, (source, own) in stated.items():
         known, si = _STREAM_UNITS.get(quantity.partition("_")[0], ({}, own))
         factor = known.get(own or "")
@@ -205,7 +231,7 @@ def read_stream(path: str | Path, stream: str, form: str | None = None) -> pd.Da
         units[quantity] = own if factor is None else si
     table = pd.DataFrame(values, index=pd.Index(time, name="time"))
     table.attrs |= {"source": raw.name, "findings": tuple(raw.findings), "units": units}
-    return with_clock(table, Clock(raw.clock or RELATIVE))
+    return with_clock(table, clock)
 
 
 def along_body(table: pd.DataFrame, axes: str = "") -> pd.DataFrame:

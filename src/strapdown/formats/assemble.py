@@ -68,6 +68,7 @@ from strapdown.formats.triad_units import (
     values_of_triads,
 )
 from strapdown.formats.vocabularies import EULERS, QUATERNIONS
+from strapdown.formats.wheel_columns import names_of_wheels, wheel_speed
 from strapdown.tables import ACCEL, GYRO, attitude_table, find_gaps, imu_of_columns
 from strapdown.tables.checks import IMPOSSIBLE_FORCE, IMPOSSIBLE_RATE, all_finite
 from strapdown.tables.on_disk import filled, let_go, room, step_range, stored
@@ -250,6 +251,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     first_row, last_row = raw.row(int(kept[0])), raw.row(int(kept[-1]))
     imu.attrs["first_row"] = first_row if last_row - first_row == len(kept) - 1 else None
     truth, scored = _truth_of_log(log, time, kept, (axes.axis, axes.sign), readings)
+    wheel = wheel_speed(raw, time, kept, log.findings)
     return Recording(
         name=raw.name,
         files=raw.files,
@@ -261,6 +263,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         findings=tuple(log.findings),
         start=raw.start,
         temperature=_temperature(raw, time, kept),
+        wheel=wheel,
     )
 
 
@@ -468,8 +471,8 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
     used = {column.source for column in found.values()}
     if not (names := [name for name in raw.columns if name and name not in used]):
         return []
-    fixes = names_of_fixes(raw)
-    if not (names := [name for name in names if name not in fixes]):
+    others = {*names_of_fixes(raw), *names_of_wheels(raw)}
+    if not (names := [name for name in names if name not in others]):
         return []
     out = [Finding("io.columns-not-used", file=raw.name, severity="note", names=names)]
     clocks = [n for n in names if _is_clock(n)]

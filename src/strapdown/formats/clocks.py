@@ -88,6 +88,10 @@ class Clock:
     week: int | None = None
 
 
+#: Keys of a table's ``attrs`` that state its clock.
+CLOCK = ("clock", "clock_origin", "clock_origin_stamp", "gps_week")
+
+
 def clock_of(table: pd.DataFrame) -> Clock:
     """Return the clock stated in a table's ``attrs``."""
     said = table.attrs

@@ -25,6 +25,7 @@ from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.join import join
 from strapdown.formats.recording import NoStreamError, RawLog, TruthInSensorAxes
 from strapdown.formats.signs import Signs
+from strapdown.formats.wheel_columns import say_wheels
 from strapdown.tables.checks import Array
 
 POSES = ("global_pose", "global_pos")
@@ -40,7 +41,7 @@ LONGEST_STEP = 0.5  # s
 
 # The arrays of the gyro or of a receiver.
 detect = Signs(
-    folder=lambda path: _find(path, "IMU", "gyro", "t") is not None or bool(files_of(path))
+    folder=lambda path: _find(path, "IMU", "gyro", "t") is not None or bool(_files_of_fixes(path))
 )
 
 
@@ -184,6 +185,58 @@ def _at_samples(time: Array, frames: Array, q: Array) -> tuple[NDArray[np.int64]
     return sample, np.asarray(rotation.compose(q[k], part))
 
 
+# Speed by the wheels.
+#
+# ``CAN/wheel_speed`` has the speeds of the wheels front left, front right, rear left, rear right in
+# m/s, ``CAN/speed`` the car's own in m/s (README, "Log Format"; ``wheel_speeds`` and ``car_speed``
+# there), by the stamps of the sensors. Rear wheels neither steer nor drive those cars.
+
+
+#: Kinds of arrays, the first that is there counts, with the columns of which the mean is used.
+CAN = {
+    **dict.fromkeys(("wheel_speed", "wheel_speeds"), slice(2, 4)),
+    **dict.fromkeys(("speed", "car_speed"), slice(0, 1)),
+}
+
+
+def _files_of_wheels(path: Path) -> tuple[str, tuple[Path, Path]] | None:
+    """Find the kind of the wheels' arrays, with their stamps and values."""
+    for kind in CAN:
+        t, value = (_find(path, "CAN", kind, part) for part in ("t", "value"))
+        if t is not None and value is not None:
+            return kind, (t, value)
+    return None
+
+
+def read_wheel(path: Path) -> RawLog:
+    """Read the mean speed of the rear wheels, else the car's own."""
+    name = path.resolve().name
+    found = _files_of_wheels(path)
+    if found is None:
+        raise NoStreamError(name, "wheel", "comma2k19 segment", ["imu"])
+    kind, files = found
+    labels = [f"{name}/{file.name if file.suffix else f'{kind}/{file.name}'}" for file in files]
+    time, values = (table_files.load_numpy(*one) for one in zip(files, labels, strict=True))
+    values = values[:, None] if values.ndim == 1 else values
+    used = CAN[kind]
+    kinds = time.dtype.kind + values.dtype.kind
+    wide = values.ndim == 2 and len(values) == time.size and values.shape[1] >= used.stop
+    if time.ndim != 1 or not wide or not set(kinds) <= set("iuf"):
+        raise DataError(
+            "io.stamps-shape-values-numbers-shapes-2",
+            file=labels[1],
+            quantity="speed",
+            shape=time.shape,
+            shape_2=values.shape,
+            dtype=values.dtype,
+            columns=used.stop,
+        )
+    speed = np.asarray(values[:, used], dtype=np.float64).mean(axis=1)
+    raw = RawLog.of(path, {"time": (time, "s"), "speed": (speed, "m/s")}, clock=RELATIVE)
+    say_wheels(raw.findings, name, ("rear left", "rear right") if used.stop == 4 else (kind,))
+    return dataclasses.replace(raw, files=files)
+
+
 # Fixes of the segment's receiver, on the clock of the inertial sensors.
 #
 # ``processed_log/GNSS`` holds ``live_gnss_ublox`` and ``live_gnss_qcom`` (README of comma2k19, "Log
@@ -214,6 +267,11 @@ def belongs(path: Path) -> bool:
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
+    """Find the stamps and values of the receiver and of the wheels of a folder."""
+    return (*_files_of_fixes(path), *(_files_of_wheels(path) or ("", ()))[1])
+
+
+def _files_of_fixes(path: Path) -> tuple[Path, ...]:
     """Find the stamps and values of the receiver of a folder; empty if there is none.
 
     `path`: the folder of a segment, its ``processed_log``, ``GNSS`` in it, the folder of one
@@ -241,7 +299,7 @@ def read_fixes(path: Path) -> Fixes:
     Returns without standard deviations. Speed and bearing are converted to velocity north and east;
     down is not measured.
     """
-    files = files_of(path)
+    files = _files_of_fixes(path)
     if not files:
         raise NoStreamError(path.resolve().name, "gnss", "comma2k19 segment", ["imu"])
     t_file, value_file = files

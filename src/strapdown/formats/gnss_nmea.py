@@ -1,14 +1,26 @@
-"""Fixes from NMEA 0183 sentences: GGA, with RMC, VTG, ZDA and GST of the same instant.
+"""NMEA 0183 sentences: fixes of GGA, with RMC, VTG, ZDA and GST, and headings of two antennas.
 
 Sentences of one instant are consecutive. GGA has the position, its quality, the height above the
 geoid and the geoid undulation; RMC and ZDA the date; GST the standard deviations of latitude,
 longitude and height; RMC or VTG speed and true course over ground, for the velocity north and east.
 The vertical velocity is not stated.
+
+Headings, deg from true north, of the first of these kinds that a file has:
+
+- ``$PASHR,time,heading,T,roll,pitch,heave,sd of roll,sd of pitch,sd of heading,quality,alignment``
+  (Trimble, help.fieldsystems.trimble.com/sps/nmea0183-messages-pashr.htm; Hemisphere without the
+  last). Quality 0 is no fix. An alignment other than 0 is of an inertial unit, whose heading is
+  its own solution.
+- ``$PSAT,HPR,time,heading,pitch,roll,type`` (Hemisphere; DGPS MAX manual, section 2.14): type N is
+  of the satellites, G of a gyro.
+- THS, heading and mode: A autonomous, E dead reckoning, M manual, S simulator, V not valid
+  (IEC 61162-1), and HDT, heading and T, which it replaces. Neither has a time.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import reduce
@@ -20,6 +32,7 @@ import numpy as np
 from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.gnss_fixes import Fixes
+from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import HEAD, Signs, first_bytes
 from strapdown.formats.text_columns import are_data, decoded, fields_of
 from strapdown.formats.writing import (
@@ -35,7 +48,12 @@ from strapdown.formats.writing import (
 from strapdown.tables.checks import POSITION_SD, values_of
 from strapdown.units import SPEEDS
 
-_SENTENCE = re.compile(r"\$([A-Z]{2})([A-Z]{3}),([^*]*)\*([0-9A-Fa-f]{2})(?:[,;\s][\d\s.,:-]*)?$")
+_SENTENCE = re.compile(
+    r"\$([A-Z]{2}|PSAT,)([A-Z]{3}),([^*]*)\*([0-9A-Fa-f]{2})(?:[,;\s][\d\s.,:-]*)?$"
+)
+TITLE = "NMEA 0183: GGA, RMC, VTG, ZDA, GST; HDT, THS, PASHR, PSAT,HPR"
+#: Kinds of sentences with a heading, the first that is there counts, and fields that they have.
+HEADINGS = {"SHR": 3, "HPR": 5, "THS": 2, "HDT": 1}
 _DAY = 86400.0
 _KNOT = SPEEDS["kn"]
 _NAN3 = (np.nan, np.nan, np.nan)
@@ -76,18 +94,11 @@ def read(path: Path) -> Fixes:
     In seconds since 1970 if a date is stated, otherwise in seconds of the first day. Sentences with
     a wrong checksum are dropped and counted.
     """
-    text, findings = decoded(path.read_bytes(), path.name)
     epochs: list[_Epoch] = []
     wrong: list[int] = []
-    for row, line in enumerate(text.splitlines(), 1):
-        start = line.find("$")
-        if start < 0:
-            continue
-        match = _SENTENCE.match(line[start:])
-        if match is None or not _whole(match):
-            wrong.append(row)
-            continue
-        _take(epochs, match[2], match[3].split(","), row, path.name)
+    sentences, findings = _sentences(path, wrong)
+    for row, kind, fields in sentences:
+        _take(epochs, kind, fields, row, path.name)
     fixed = [e for e in epochs if np.isfinite(e.quality)]
     if not fixed:
         raise DataError("io.holds-no-gga-sentence-whole", file=path.name)
@@ -122,6 +133,101 @@ def read(path: Path) -> Fixes:
     )
 
 
+def _sentences(
+    path: Path, wrong: list[int]
+) -> tuple[Iterator[tuple[int, str, list[str]]], list[Finding]]:
+    """Return the sentences, each with its row, kind and fields; damaged rows go to `wrong`."""
+    text, findings = decoded(path.read_bytes(), path.name)
+
+    def whole() -> Iterator[tuple[int, str, list[str]]]:
+        for row, line in enumerate(text.splitlines(), 1):
+            start = line.find("$")
+            if start < 0:
+                continue
+            match = _SENTENCE.match(line[start:])
+            if match is None or not _whole(match):
+                wrong.append(row)
+                continue
+            yield row, match[2], match[3].split(",")
+
+    return whole(), findings
+
+
+def read_heading(path: Path) -> RawLog:
+    """Read the headings of two antennas, deg, with standard deviations where all have one.
+
+    On the clock of `read`. A heading without a time of its own has that of the sentence before it,
+    the first of several. Those that are marked as not valid, or as not of the antennas, are left
+    out and counted.
+    """
+    epochs: list[_Epoch] = []
+    found: dict[str, list[tuple[int, int, float, float]]] = {}
+    without: dict[str, int] = {}
+    sentences, findings = _sentences(path, [])
+    for row, kind, fields in sentences:
+        if kind not in HEADINGS:
+            _take(epochs, kind, fields, row, path.name)
+            continue
+        if len(fields) < HEADINGS[kind] or (kind == "SHR" and fields[2] != "T"):
+            continue  # a sentence of Ashtech under the same name has letters
+        if kind in ("SHR", "HPR"):
+            time = _number(fields, 0, kind, "time", row, path.name)
+            time = _time_of_day(time) if np.isfinite(time) else np.nan
+            if not epochs or epochs[-1].time != time:
+                epochs.append(_Epoch(row, time))
+        heading = _number(fields, int(kind in ("SHR", "HPR")), kind, "heading", row, path.name)
+        sd = np.nan
+        if kind == "SHR" and len(fields) > 8:
+            sd = _number(fields, 8, kind, "standard deviation", row, path.name)
+        known = found.setdefault(kind, [])
+        first = not known or known[-1][0] != len(epochs) - 1
+        timed = bool(epochs) and np.isfinite(epochs[-1].time)
+        if not (timed and first and np.isfinite(heading) and _of_antennas(kind, fields)):
+            without[kind] = without.get(kind, 0) + 1
+            continue
+        known.append((len(epochs) - 1, row, heading, sd))
+    chosen = next((kind for kind in HEADINGS if kind in found), None)
+    if chosen is None:
+        raise NoStreamError(path.name, "heading", TITLE, ["gnss"])
+    if count := without.get(chosen, 0):
+        add_note(findings, "io.headings-left-out", file=path.name, quantity="heading", count=count)
+    if not found[chosen]:
+        raise DataError("io.no-usable-heading", file=path.name, quantity="heading", count=count)
+    if chosen in ("THS", "HDT"):
+        add_note(findings, "io.heading-without-time", file=path.name, quantity="time", kind=chosen)
+    times, clock = _times(epochs)
+    at, rows, heading_deg, sd_deg = (np.array(part) for part in zip(*found[chosen], strict=True))
+    _, order = np.unique(times[at], return_index=True)  # in time, each instant once
+    out = {"time": (times[at[order]], "s"), "heading": (heading_deg[order], "deg")}
+    if (sd_deg > 0.0).all():
+        out["heading_sd"] = (sd_deg[order], "deg")
+    return RawLog.of(path, out, clock=clock.name, rows=rows[order], findings=findings)
+
+
+def _of_antennas(kind: str, fields: list[str]) -> bool:
+    """Whether a heading is marked as valid, and as one by satellites alone."""
+    if kind == "SHR":
+        by_unit = len(fields) > 10 and fields[10] not in ("", "0")
+        return not by_unit and (len(fields) < 10 or fields[9] != "0")
+    if kind == "HPR":
+        return fields[4] == "N"
+    return kind == "HDT" or fields[1] == "A"
+
+
+def _time_of_day(clock: float) -> float:
+    """Compute seconds of the day from hhmmss.ss."""
+    return float(3600.0 * (clock // 1e4) + 60.0 * (clock // 1e2 % 1e2) + round(clock % 1e2, 6))
+
+
+def _number(fields: list[str], k: int, kind: str, what: str, row: int, file: str) -> float:
+    try:
+        return float(fields[k]) if fields[k] else np.nan
+    except ValueError:
+        raise DataError(
+            "io.not-number", file=file, row=row, quantity=f"{kind} {what}", fields=fields[k]
+        ) from None
+
+
 def _whole(match: re.Match[str]) -> bool:
     body = f"{match[1]}{match[2]},{match[3]}"
     return reduce(xor, body.encode("latin-1", "replace"), 0) == int(match[4], 16)
@@ -145,20 +251,14 @@ def _take(epochs: list[_Epoch], kind: str, fields: list[str], row: int, file: st
         return
 
     def number(k: int, what: str) -> float:
-        try:
-            return float(fields[k]) if fields[k] else np.nan
-        except ValueError:
-            raise DataError(
-                "io.not-number", file=file, row=row, quantity=f"{kind} {what}", fields=fields[k]
-            ) from None
+        return _number(fields, k, kind, what, row, file)
 
     if kind == "VTG":
         # Without a time: belongs to the epoch before it, if that has no velocity yet.
         if epochs and np.isnan(epochs[-1].velocity[0]):
             epochs[-1].velocity = _over_ground(number(4, "speed"), number(0, "course"))
         return
-    clock = number(0, "time")
-    time = 3600.0 * (clock // 1e4) + 60.0 * (clock // 1e2 % 1e2) + round(clock % 1e2, 6)
+    time = _time_of_day(number(0, "time"))
     if not epochs or epochs[-1].time != time:
         epochs.append(_Epoch(row, time))
     epoch = epochs[-1]

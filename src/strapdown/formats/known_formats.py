@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -288,7 +289,7 @@ def force_of(linear: RawLog, gravity: RawLog) -> RawLog:
 Quantities = dict[str, tuple[NDArray[Any], str | None]]
 
 
-_SENTENCE = re.compile(rb"\$[A-Z]{5},[ -#%-)+-~]*\*[0-9A-Fa-f]{2}")
+_SENTENCE = re.compile(rb"\$(?:[A-Z]{5}|PSAT),[ -#%-)+-~]*\*[0-9A-Fa-f]{2}")
 
 
 @contextmanager
@@ -355,12 +356,38 @@ def or_sentences(read: Callable[[Path], RawLog]) -> Callable[[Path], RawLog | Fi
             found = _SENTENCE.findall(path.read_bytes())
             if not any(sentence[3:6] == b"GGA" for sentence in found):
                 raise
-        with tempfile.TemporaryDirectory() as folder:
-            lines = Path(folder) / path.name
-            lines.write_bytes(b"\n".join(found))
-            fixes = gnss_nmea.read(lines)
+        fixes = _of_sentences(path, found, gnss_nmea.read)
         note = Finding("io.fixes-of-sentences", file=path.name, severity="note", count=len(found))
         fixes.findings.append(note)
         return fixes
 
     return either
+
+
+def or_headings(read: Callable[[Path], RawLog]) -> Callable[[Path], RawLog]:
+    """Make a reader of headings that takes those of NMEA sentences if the stream has no own."""
+
+    def either(path: Path) -> RawLog:
+        try:
+            return read(path)
+        except NoStreamError:
+            found = _SENTENCE.findall(path.read_bytes())
+            if not any(sentence[3:6] in _HEADINGS for sentence in found):
+                raise
+        raw = _of_sentences(path, found, gnss_nmea.read_heading)
+        return dataclasses.replace(raw, files=(path,), rows=None)
+
+    return either
+
+
+#: Letters 3 to 5 of sentences with a heading.
+_HEADINGS = {b"HDT", b"THS", b"SHR", b"AT,"}
+_Read = TypeVar("_Read", RawLog, Fixes)
+
+
+def _of_sentences(path: Path, found: list[bytes], read: Callable[[Path], _Read]) -> _Read:
+    """Read the sentences of a stream as those of a file of its name."""
+    with tempfile.TemporaryDirectory() as folder:
+        lines = Path(folder) / path.name
+        lines.write_bytes(b"\n".join(found))
+        return read(lines)

@@ -11,6 +11,12 @@ not a sensor's output, and is not read. Stamps are GPS seconds of week. As text 
 ASCII.htm, Abbreviated headers aside) a line is ``#BESTPOSA,…,week,seconds,…;fields*CRC``, or with a
 short header ``%RAWIMUSA,week,seconds;fields*CRC``.
 
+HEADING, HEADING2 and DUALANTENNAHEADING (Content/Logs) have the vector from the base's antenna to
+the rover's, or from the primary one to the second: its length, heading from true north, pitch and
+their standard deviations in deg, used where the ambiguities are fixed. Unicore's UNIHEADINGA (N4
+commands manual) has the same fields from the master antenna to the second, behind a header of its
+own: ``#UNIHEADINGA,idle,GPS,status,week,milliseconds,…``.
+
 Text exports of Inertial Explorer (NovAtel Waypoint), as a reference.
 
 A preamble (``Program: Inertial Explorer Version …``), a line of names, a line of units, rows
@@ -36,7 +42,13 @@ from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats.clocks import GPS, WEEK, Clock
-from strapdown.formats.known_formats import Quantities, damage, or_sentences, solution
+from strapdown.formats.known_formats import (
+    Quantities,
+    damage,
+    or_headings,
+    or_sentences,
+    solution,
+)
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.formats.text_columns import decoded
@@ -49,6 +61,10 @@ RAWIMU, RAWIMUS, RAWIMUX, RAWIMUSX, INSCONFIG = 268, 325, 1461, 1462, 1945
 CORRECTED = (812, 813, 1362, 2264)
 STREAMS = {"imu": (RAWIMU, RAWIMUS, RAWIMUX, RAWIMUSX), "gnss": (BESTPOS,)}
 STREAMS |= {"reference": (INSPVA, INSPVAS, INSPVAX)}
+HEADING, HEADING2, DUAL = 971, 1335, 2042
+UNICORE = 1 << 16 | 972  # of another maker: beyond the numbers of NovAtel
+STREAMS |= {"heading": (DUAL, HEADING2, HEADING, UNICORE)}
+FIXED = (48, 49, 50)  # types of a position whose ambiguities are whole numbers
 SOLVED = (3, 6, 7)  # states of the inertial solution: good, free, alignment complete
 # Type of position to field 6 of NMEA GGA; 50s are aided by the inertial unit.
 QUALITY = {16: 1, 53: 1, 17: 2, 18: 2, 52: 2, 54: 2, 19: 6, 1: 7, 2: 7}
@@ -89,6 +105,10 @@ TEXTS: dict[str, tuple[int, str]] = {
     "RAWIMUS": (RAWIMUS, "<IdI6i"),
     "RAWIMUX": (RAWIMUX, "<BBHdI6i"),
     "RAWIMUSX": (RAWIMUSX, "<BBHdI6i"),
+    "HEADING": (HEADING, "<II6f"),
+    "HEADING2": (HEADING2, "<II6f"),
+    "DUALANTENNAHEADING": (DUAL, "<II6f"),
+    "UNIHEADING": (UNICORE, "<II6f"),
 }
 #: States of a solution and of the inertial solution, types of a position, and the datum, by name
 #: (tables Solution Status, Position or Velocity Type, Inertial Solution Status, Datum).
@@ -107,13 +127,16 @@ _OTHER_STATE = 99
 _STATUS = {RAWIMU: 2, RAWIMUS: 2, RAWIMUX: 4, RAWIMUSX: 4}
 _LINE = re.compile(
     rb"^(?:#(\w+)A,(?:[^,;\r\n]*,){4}(\d+),(\d+\.\d+),[^;\r\n]*"
-    rb"|%(\w+)A,(\d+),(\d+\.\d+));([^*\r\n]*)\*([0-9a-fA-F]{8})[ \t]*\r?$",
+    rb"|%(\w+)A,(\d+),(\d+\.\d+)"
+    rb"|#(UNI\w+)A,[^,;\r\n]*,GPS,[^,;\r\n]*,(\d+),(\d+),[^;\r\n]*)"
+    rb";([^*\r\n]*)\*([0-9a-fA-F]{8})[ \t]*\r?$",
     re.M,
 )
 
 
 detect = Signs(
-    first=rb"\xaa\x44[\x12\x13]|(?m:^[#%](?:BESTPOS|BESTVEL|INSPVA|RAWIMU)S?X?A,)",
+    first=rb"\xaa\x44[\x12\x13]|(?m:^[#%](?:BESTPOS|BESTVEL|INSPVA|RAWIMU)S?X?A,)"
+    rb"|(?m:^#(?:UNI|DUALANTENNA)?HEADING2?A,)",
     # Two frames with their CRC.
     also=lambda path: sum(map(len, _frames(first_bytes(path, 8192))[0].values())) >= 2,
 )
@@ -124,17 +147,17 @@ def _lines(data: bytes) -> tuple[Frames, int]:
     found: Frames = {}
     lost = 0
     for m in _LINE.finditer(data):
-        name, week, second = (m[1], m[2], m[3]) if m[1] else (m[4], m[5], m[6])
+        name, week, stamp = next(m.group(k, k + 1, k + 2) for k in (1, 4, 7) if m[k])
         kind, form = TEXTS.get(name.decode(), (0, ""))
         if not kind:
             continue
         line = m[0]
-        if _crc(line[1 : line.rindex(b"*")]) != int(m[8], 16):
+        if _crc(line[1 : line.rindex(b"*")]) != int(m[11], 16):
             lost += 1
             continue
         try:
             letters = re.sub(r"(\d+)(\w)", lambda n: n[2] * int(n[1]), form[1:])
-            fields = m[7].decode().split(",")[: len(letters)]
+            fields = m[10].decode().split(",")[: len(letters)]
             values = [
                 int(field, 16) if k == _STATUS.get(kind) else _value(field, letters[k])
                 for k, field in enumerate(fields)
@@ -143,7 +166,7 @@ def _lines(data: bytes) -> tuple[Frames, int]:
         except (ValueError, struct.error):
             lost += 1
             continue
-        ms = round(float(second) * 1000.0)
+        ms = int(stamp) if m[7] else round(float(stamp) * 1000.0)
         found.setdefault(kind, []).append((int(week) * WEEK_MS + ms, message))
     return found, lost
 
@@ -271,6 +294,26 @@ def read_fixes(path: Path) -> RawLog:
             code = "io.velocity-late"
             add_note(findings, code, file=path.name, late=late)
         out |= {f"V{a}": (ned[:, k], "m/s") for k, a in enumerate("NED")}
+    return RawLog.of(path, out, clock=GPS, findings=findings)
+
+
+@or_headings
+def read_heading(path: Path) -> RawLog:
+    """Read the heading of the baseline of two antennas; its length, m, where it is stated."""
+    frames, findings = _read(path, "heading")
+    kind = next(k for k in STREAMS["heading"] if k in frames)
+    with damage(path):
+        rows = [(t, *struct.unpack_from("<II6f", m)) for t, m in frames[kind]]
+    kept = [r for r in rows if r[1] == 0 and r[2] in FIXED and r[7] > 0.0]
+    if count := len(rows) - len(kept):
+        add_note(findings, "io.headings-left-out", file=path.name, quantity="heading", count=count)
+    if not kept:
+        raise DataError("io.no-usable-heading", file=path.name, quantity="heading", count=count)
+    stamps = np.array([r[0] for r in kept], dtype=np.int64)
+    table = np.array(kept, dtype=np.float64)
+    out: Quantities = {"time": (stamps % WEEK_MS, "ms"), "week": (stamps // WEEK_MS, None)}
+    out |= {"heading": (table[:, 4], "deg"), "heading_sd": (table[:, 7], "deg")}
+    out["baseline"] = (np.where(table[:, 3] > 0.0, table[:, 3], np.nan), "m")
     return RawLog.of(path, out, clock=GPS, findings=findings)
 
 

@@ -19,7 +19,13 @@ from strapdown.earth import radii_of_curvature
 from strapdown.errors import DataError, Finding, add_note
 from strapdown.formats.clocks import GPS, RELATIVE, WEEK, Clock, gps_from_unix
 from strapdown.formats.join import join
-from strapdown.formats.known_formats import Quantities, damage, or_sentences, solution
+from strapdown.formats.known_formats import (
+    Quantities,
+    damage,
+    or_headings,
+    or_sentences,
+    solution,
+)
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.frames import C_ne, geodetic_from_ecef
@@ -37,19 +43,27 @@ from strapdown.tables.checks import Array
 # field: deg/s in steps of 2^-12, m/s² in steps of 2^-10, the speed of a wheel in mm/s, in axes of
 # the unit on its board, at time tags in ms of the receiver's own clock, which the order of the
 # messages relates to GPS time, to the time that the receiver needs for a fix. ESF-RAW has time
-# tags of an undocumented unit, and is not read.
+# tags of an undocumented unit, and is not read. NAV-RELPOSNED of version 1 (UBX-18010854, HPG 1.12
+# and later: 64 bytes) has the vector from the base's antenna to the rover's: its heading and the
+# accuracy of that in 1e-5 deg, its length in cm and 0.1 mm. It is used where the base moves along
+# (``isMoving``), the ambiguities are fixed (``carrSoln`` 2) and the heading is valid.
 
 
 UBX_TITLE = "u-blox UBX stream"
 LEAST_FRAMES = 3  # of a stream that begins with something else
 PVT, PVAT, MEAS, RAW = b"\x01\x07", b"\x01\x17", b"\x10\x02", b"\x10\x03"
 PRECISE = b"\x01\x14"  # NAV-HPPOSLLH
+RELATIVE_POSITION = b"\x01\x3c"  # NAV-RELPOSNED
+#: Bits of its flags: fix, relative position, fixed ambiguities of two bits, moving base, heading;
+#: those of them that must be set; and the bit of a vector of unit length.
+USED_BITS, WANTED_BITS, UNIT_LENGTH = 0x13D, 0x135, 0x200
 NAMES = {
     "precise": (PRECISE,),
     "gnss": (PVT, PVAT),
     "reference": (PVAT,),
     "imu": (MEAS,),
     "wheel": (MEAS,),
+    "heading": (RELATIVE_POSITION,),
 }
 GYRO, ACCEL, SPEED = (14, 13, 5), (16, 17, 18), 11  # types of data, x y z
 SCALES = {**dict.fromkeys(GYRO, 2.0**-12), **dict.fromkeys(ACCEL, 2.0**-10), SPEED: 1e-3}
@@ -238,6 +252,50 @@ def read_ubx_wheel(path: Path) -> RawLog:
     if not tags.size:
         raise NoStreamError(path.name, "wheel", UBX_TITLE, ["imu"])
     return RawLog.of(path, {"time": (tags, "ms"), "speed": (values[:, 0], "m/s")}, clock=RELATIVE)
+
+
+@or_headings
+def read_ubx_heading(path: Path) -> RawLog:
+    """Read the heading of the baseline of a moving base, at GPS seconds of week."""
+    dated: tuple[float, int] | None = None
+    rows, lost = [], 0
+    with damage(path):
+        data = path.read_bytes()
+        for frame in ubx_frames(data):
+            body = frame[6:-2]
+            if frame[2:4] == PVT and len(body) >= 12 and dated is None:
+                tow, year, *rest, valid = struct.unpack_from("<IH6B", body)
+                names = ("month", "day", "hour", "min", "sec")
+                date = dict(zip(names, rest, strict=True)) | {"iTOW": tow, "year": year}
+                both = {"validDate": valid & 1, "validTime": valid & 2}
+                found = _week(SimpleNamespace(**date, **both))
+                dated = (found, tow) if np.isfinite(found) else None
+            if frame[2:4] != RELATIVE_POSITION or len(body) != 64 or body[0] != 1:
+                continue
+            tow, _, _, _, cm, angle, *_, tenths, _, _, _, _, sd, flags = struct.unpack(
+                "<4xI5i4x4b5I4xI", body
+            )
+            if flags & USED_BITS != WANTED_BITS or not sd:
+                lost += 1
+                continue
+            length = np.nan if flags & UNIT_LENGTH else 1e-2 * cm + 1e-4 * tenths
+            rows.append((tow, angle, sd, length))
+    if not rows and not lost:
+        held = {frame[2:4] for frame in ubx_frames(data)}
+        has = [s for s, kinds in NAMES.items() if any(k in held for k in kinds)]
+        has = [s for s in has if s not in ("precise", "heading")]
+        raise NoStreamError(path.name, "heading", UBX_TITLE, has or ["other messages"])
+    findings: list[Finding] = []
+    if lost:
+        add_note(findings, "io.headings-left-out", file=path.name, quantity="heading", count=lost)
+    if not rows:
+        raise DataError("io.no-usable-heading", file=path.name, quantity="heading", count=lost)
+    tow, angle, sd, length = np.array(rows, dtype=np.float64).T
+    out: Quantities = {"time": (tow, "ms"), "heading": (angle, "1e-5 deg")}
+    out |= {"heading_sd": (sd, "1e-5 deg"), "baseline": (length, "m")}
+    if dated is not None:  # within half a week
+        out["week"] = (dated[0] + np.round((dated[1] - tow) / WEEK_MS), None)
+    return RawLog.of(path, out, clock=GPS, findings=findings)
 
 
 # Septentrio Binary Format (``.sbf``).

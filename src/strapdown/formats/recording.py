@@ -300,6 +300,9 @@ class Recording:
         Position and attitude at the start, if the file states them.
     temperature : Series or None
         Temperature at the stamps of `imu`, °C, under the name of its column, if there is one.
+    wheel : Series or None
+        Speed of the vehicle's wheels, m/s, at the stamps of `imu` that have a new one, under the
+        names of its columns.
     """
 
     name: str
@@ -312,6 +315,7 @@ class Recording:
     findings: tuple[Finding, ...]
     start: StatedStart | None = None
     temperature: pd.Series | None = None
+    wheel: pd.Series | None = None
 
 
 #: Answers for a value which the numbers do not show: a unit, a rate.

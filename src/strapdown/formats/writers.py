@@ -1,8 +1,9 @@
 """Formats that are written: the table of writers, the mirror of `formats.READERS`.
 
 A writer takes streams by their names (`formats.STREAMS`): ``imu``, ``gnss``, ``reference`` (a
-Trajectory or an Attitude table), ``magnetometer``, ``barometer``, ``wheel``. It returns as findings
-what the format cannot hold, and what became of stamps that its clock does not fit.
+Trajectory or an Attitude table), ``magnetometer``, ``barometer``, ``wheel``, ``heading``. It
+returns as findings what the format cannot hold, and what became of stamps that its clock does not
+fit.
 """
 
 from __future__ import annotations
@@ -442,6 +443,7 @@ _TABLE: dict[str, tuple[Part, ...]] = {
     "magnetometer": ("µT", AXES),
     "barometer": ("Pa",),
     "wheel": ("m/s",),
+    "heading": ("deg",),
 }
 _PLACES: tuple[Part, ...] = ("positions over WGS 84", "dates", ("speed and course", VELOCITY[0]))
 _MAP: dict[str, tuple[Part, ...]] = dict.fromkeys(("reference", "gnss"), ("positions over WGS 84",))

@@ -178,6 +178,8 @@ def options(
     for option in options_of(module):
         if option.key in chosen:
             remark, check = _CHOSEN.get(option.key, ""), (checks or {}).get(option.key, "")
+            if chosen[option.key] == "?":
+                remark = f"only you know: {_WANTED[option.key]}"
             page.key(option.key, _inline(chosen[option.key]), remark, check=check)
             continue
         value = toml_value(option.default)
@@ -203,6 +205,9 @@ _CHOSEN = {"backtrack": "navigation begins with the first sample of that part"}
 _WANTED = {
     "heading_deg": "heading of the body at the start, clockwise from north (gyros that "
     "find north at a rest of a minute need none, if their sensor is named)",
+    "axis_deg": "direction of the baseline, from the antenna of the base (master, primary) to the "
+    "other one, in the body, from forward to the right: 0 if the other one is in front, 90 on the "
+    "right, 180 behind, -90 on the left",
     "sd_deg": "how well that heading is known, one standard deviation",
 }
 

@@ -32,7 +32,7 @@ Write = Callable[[Path, dict[str, NDArray[Any]], dict[str, str]], None]
 
 WRITERS: dict[str, Write] = {".csv": csv.write, ".parquet": table_files.write_parquet}
 #: Streams of fixes, a trajectory and other sensors, in files beside that of the samples.
-BESIDE = ("gnss", "reference", "magnetometer", "barometer", "wheel")
+BESIDE = ("gnss", "reference", "magnetometer", "barometer", "wheel", "heading")
 
 
 def write_clean_log(found: Diagnosis, out: str | Path, *, force: bool = False) -> tuple[Path, ...]:

@@ -46,7 +46,7 @@ from strapdown.formats import (
     open_stream,
     reader_of,
 )
-from strapdown.formats.aid_table import read_stream
+from strapdown.formats.aid_table import read_stream, wheel_table
 from strapdown.formats.clocks import clock_of, on_clock_of
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.gnss_files import read_gnss
@@ -538,7 +538,9 @@ def _others(
             if TABLE in held and recording is None and "gnss" not in streams:
                 with suppress(DataError):
                     streams["reference"] = read_truth(Path(log.path))
-    for name in ("magnetometer", "barometer", "wheel"):
+    if recording is not None and recording.wheel is not None:
+        streams["wheel"] = wheel_table(recording)
+    for name in ("magnetometer", "barometer", "wheel", "heading"):
         if name not in held:
             continue
         try:

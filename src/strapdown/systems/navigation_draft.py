@@ -19,17 +19,19 @@ from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.logs import FixesTable, LogTable
 from strapdown.config.navigation import STAGES
 from strapdown.config.toml_text import ASK, Draft, Offered, Page, inline, named_from, string
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
 from strapdown.dsp.samples import true_runs, white_sd
 from strapdown.earth import FIRST_YEAR, LAST_YEAR, THIS_YEAR, magnetic_field
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.sensor_blocks import STATED_STATES, resting_sd, states_that_are_stated
 from strapdown.formats import holds
+from strapdown.formats.aid_table import read_stream, wheel_table
 from strapdown.formats.clocks import on_clock_of, year_of
 from strapdown.formats.gnss_fixes import POSITION_SDS, VELOCITY_SDS
-from strapdown.formats.recording import ABSENT
+from strapdown.formats.recording import ABSENT, Recording
 from strapdown.frames import ways_between
 from strapdown.navigation.measurements.barometer import Barometer
+from strapdown.navigation.measurements.heading import Heading
 from strapdown.navigation.measurements.magnetometer import Magnetometer
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement, longer_by
 from strapdown.navigation.measurements.vehicle import Odometer
@@ -44,10 +46,12 @@ from strapdown.systems.alignment_draft import (
     stage,
     toml_value,
 )
+from strapdown.systems.baseline_angle import baseline_angle
 from strapdown.systems.navigation_checks import finer_than_arm
 from strapdown.systems.navigation_proposal import LOUD, NOISE_KEYS, TAKEN, Proposal, propose
 from strapdown.systems.navigation_source import read_measured
 from strapdown.tables import ACCEL, GEODETIC, GYRO, MAG, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables.aiding import HEADING
 from strapdown.tables.checks import Array, index_of, source_of, values_of
 
 # --- measurements of other sensors that the recording holds -----------------------------
@@ -59,9 +63,17 @@ LEAST_ROWS = 10
 GUSTS, OF_DYNAMIC, WEATHER = 0.5, 0.1, 30.0
 #: Time over which heights are averaged, s: faster they show no more, and cost updates.
 MEAN = 1.0
+#: Error of a heading of two antennas by reflected signals, deg, where no standard deviation is
+#: stated, and how long it lasts, s.
+REFLECTED, LASTS = 0.3, 20.0
+#: Errors of the angle of a baseline, deg: of the mounting of the unit in the vehicle, whose course
+#: shows the angle, as of an alignment by the course; and of an angle that a person states.
+MOUNTED, STATED_ANGLE = 5.0, 2.0
 #: Error of a wheel's speed by slip, a bus that is late, and a lever arm that nobody stated, m/s,
 #: and how long it lasts, s.
 SLIP, TURN = 0.3, 2.0
+#: Speed up to which a vehicle may go backwards, m/s: many buses have no sign.
+BACKWARDS = 3.0
 #: Differences of the Earth's field, as a share of its strength and in dip, deg, that show iron: of
 #: hard iron that turns a heading by about as much.
 WEAK, DIP = 0.15, 8.0
@@ -122,7 +134,12 @@ class Magnetic:
 
 
 def propose_aids(
-    log: LogTable, imu: pd.DataFrame, fixes: pd.DataFrame | None
+    log: LogTable,
+    imu: pd.DataFrame,
+    fixes: pd.DataFrame | None,
+    *,
+    recording: Recording | None = None,
+    beside: str | None = None,
 ) -> tuple[dict[str, dict[str, Any]], tuple[Finding, ...]]:
     """Propose a table for each stream of a recording that can aid navigation.
 
@@ -133,7 +150,12 @@ def propose_aids(
     imu : DataFrame
         Imu table of the log.
     fixes : DataFrame, optional
-        Gnss table; its speed says how much the wind of travel disturbs a pressure.
+        Gnss table; its speed says how much the wind of travel disturbs a pressure, and its course
+        where a baseline of two antennas points.
+    recording : Recording, optional
+        Of the log, whose columns may have the speed of the wheels.
+    beside : str, optional
+        File of the fixes, which may have the headings of two antennas.
 
     Returns
     -------
@@ -144,17 +166,27 @@ def propose_aids(
     """
     tables: dict[str, dict[str, Any]] = {}
     findings: list[Finding] = []
-    for aid in (Barometer(height_sd=1.0, interval=MEAN), Odometer(speed_sd=1.0)):
-        if not holds(Path(log.path), aid.stream):
+    of_log = [Barometer(height_sd=1.0, interval=MEAN), Odometer(speed_sd=1.0)]
+    ways = [(aid, log.path) for aid in (*of_log, Heading(heading_sd_deg=1.0))]
+    ways += [(Heading(heading_sd_deg=1.0), beside)] if beside not in (None, log.path) else []
+    held = recording is not None and recording.wheel is not None
+    columns = wheel_table(recording) if recording is not None and held else pd.DataFrame()
+    for aid, path in ways:
+        of_columns = isinstance(aid, Odometer) and held
+        if aid.kind in tables or not (of_columns or holds(Path(path), aid.stream)):
             continue
         try:
-            table = _read(log, aid, imu)
+            table = _within(columns, imu) if of_columns else _read(log, aid, imu, path)
         except DataError as error:
             if error.finding.code not in ABSENT:
                 findings.append(error.finding.replace(severity="warning", stream=aid.stream))
             continue
-        findings += table.attrs["findings"]
+        findings += table.attrs.get("findings", ())
         if len(table) < LEAST_ROWS:
+            continue
+        if isinstance(aid, Heading):
+            tables[aid.kind], shown = _of_antennas(path, table, fixes)
+            findings += shown
             continue
         errors = _error_of(aid, fixes)
         step = float(np.median(np.diff(index_of(table))))
@@ -164,14 +196,50 @@ def propose_aids(
         own = {"height_sd_m": size, "interval_s": MEAN}
         if not isinstance(aid, Barometer):
             own = {"speed_sd_m_per_s": size}
+            if (values_of(table, aid.columns[:1]) >= 0.0).all():
+                own["least_speed_m_per_s"] = BACKWARDS
         stated = {key: float(f"{x:.2g}") for key, x in own.items()}
-        tables[aid.kind] = {"kind": aid.kind, "path": log.path, **stated}
+        where = {} if of_columns else {"path": path}
+        tables[aid.kind] = {"kind": aid.kind, **where, **stated}
     return tables, tuple(findings)
 
 
-def _read(log: LogTable, aid: TabulatedMeasurement, imu: pd.DataFrame) -> pd.DataFrame:
+def _of_antennas(
+    path: str, table: pd.DataFrame, fixes: pd.DataFrame | None
+) -> tuple[dict[str, Any], list[Finding]]:
+    """Propose the table of the headings of two antennas, with what shows the angle, or asks it."""
+    out: dict[str, Any] = {"kind": Heading.kind, "path": path}
+    if HEADING[1] not in read_stream(path, Heading.stream):
+        step = float(np.median(np.diff(index_of(table))))
+        heading = np.unwrap(values_of(table, HEADING[:1])[:, 0], period=360.0)
+        # As `white_sd`, by the median: what changes is mostly the vehicle's heading, in turns.
+        scatter = MAD_TO_SD * float(np.median(np.abs(np.diff(heading, n=2)))) / math.sqrt(6.0)
+        size = math.hypot(scatter, REFLECTED * math.sqrt(longer_by(step, LASTS)))
+        out["heading_sd_deg"] = float(f"{size:.2g}")
+    angle = None if fixes is None else baseline_angle(table, fixes)
+    if angle is None:
+        return {**out, "axis_deg": ASK.strip('"'), "misalignment_sd_deg": STATED_ANGLE}, []
+    shown = Finding(
+        "navigation.baseline-angle",
+        severity="note",
+        file=source_of(table),
+        quantity="heading",
+        angle=angle.angle_deg,
+        sd=angle.sd_deg,
+        scatter=angle.scatter_deg,
+        duration=angle.duration,
+    )
+    sd = float(f"{math.hypot(angle.sd_deg, MOUNTED):.2g}")
+    return {**out, "axis_deg": round(angle.angle_deg, 1), "misalignment_sd_deg": sd}, [shown]
+
+
+def _read(log: LogTable, aid: TabulatedMeasurement, imu: pd.DataFrame, path: str) -> pd.DataFrame:
     """Read the rows of a stream within the samples, on their clock."""
-    table, _ = on_clock_of(read_measured(aid, log.path, repair=log.repair), imu)
+    return _within(on_clock_of(read_measured(aid, path, repair=log.repair), imu)[0], imu)
+
+
+def _within(table: pd.DataFrame, imu: pd.DataFrame) -> pd.DataFrame:
+    """Rows of a table within the samples."""
     begin, end = np.searchsorted(index_of(table), index_of(imu)[[0, -1]])
     return table.iloc[begin:end]
 
@@ -254,7 +322,7 @@ def _field(log: LogTable, imu: pd.DataFrame) -> tuple[pd.DataFrame | None, dict[
     if not holds(Path(log.path), Magnetometer.stream):
         return None, {}
     try:
-        return _read(log, Magnetometer(interval=0.0), imu), {"path": log.path}
+        return _read(log, Magnetometer(interval=0.0), imu, log.path), {"path": log.path}
     except DataError:
         return None, {}
 
@@ -265,6 +333,7 @@ UNSTATED, STEADY = "io.sampling-taken-as-instantaneous", 0.5
 LASTING_ERRORS = {
     "barometer": "gusts, and the wind of travel",
     "odometer": "slip, a bus that is late, and lever_arm_m, which is taken as zero",
+    "heading": "reflected signals",
 }
 #: Consequence of a magnetic heading.
 MAGNETIC = "by the magnetometer at the start, whose field is like the Earth's: is no iron near?"
@@ -304,7 +373,13 @@ def draft_navigation(
     site = made.table.get("site")
     place = None if site is None else (site["lat_deg"], site["lon_deg"], site["alt_m"])
     magnetic = propose_magnetometer(log, made.imu, made.gnss, place)
-    aids, of_aids = propose_aids(log, made.recording.imu, made.gnss)
+    aids, of_aids = propose_aids(
+        log,
+        made.recording.imu,
+        made.gnss,
+        recording=made.recording,
+        beside=made.table.get("aiding", {}).get("gnss", {}).get("path"),
+    )
     table = {**made.table, "aiding": {**made.table.get("aiding", {}), **aids}}
     said = (*made.findings, *(one for one in of_aids if one not in made.findings))
     made = replace(made, table=table, findings=said)
@@ -639,10 +714,9 @@ def _aids(
             if aid["kind"] == "gnss":
                 _with_remarks(page)
             else:
-                page.say(
-                    "Found in the recording. The standard deviation of a row: its scatter, and "
-                    f"errors that last: {LASTING_ERRORS[aid['kind']]}."
-                )
+                page.say(_why(aid, made))
+        elif aid["kind"] in LASTING_ERRORS:
+            page.say(_why(aid, made))
         for key, what, usual in (
             ("position_sd_m", "position, m", POSITION_SDS),
             ("velocity_sd_m_per_s", "velocity, m/s", VELOCITY_SDS),
@@ -703,6 +777,31 @@ def _aids(
     if made.rest >= 1.0:
         told.append(f"stationary for the first {made.rest:.4g} s, by the sensors and the fixes")
     return [*told, *others]
+
+
+def _why(aid: Mapping[str, Any], made: Proposal) -> str:
+    """Grounds of the table of another sensor."""
+    said = (
+        "Found in the recording. The standard deviation of a row: its scatter, and errors that "
+        f"last: {LASTING_ERRORS[aid['kind']]}."
+    )
+    if "least_speed_m_per_s" in aid:
+        said += " No speed is negative: slower ones may be of driving backwards, and are not used."
+    if aid["kind"] != Heading.kind:
+        return said
+    if "heading_sd_deg" not in aid:
+        said = (
+            "Found in the recording, with the standard deviation of each row; "
+            f"{LASTING_ERRORS[aid['kind']]} have errors that last longer."
+        )
+    for one in made.findings:
+        if one.code == "navigation.baseline-angle":
+            said += (
+                f" axis_deg: headings less the course, ± {one.data['scatter']:.2g}° each, over "
+                f"{one.data['duration']:.0f} s of driving straight. misalignment_sd_deg: as far as "
+                "the unit may be turned in the vehicle."
+            )
+    return said
 
 
 def _magnetic(found: Magnetic) -> str:

@@ -18,11 +18,16 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
 from strapdown.evaluation.differences import rotation_contradicted
 from strapdown.formats import files_of
-from strapdown.formats.aid_table import along_body, read_aid_table, read_control_points
+from strapdown.formats.aid_table import (
+    along_body,
+    read_aid_table,
+    read_control_points,
+    wheel_table,
+)
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
-from strapdown.formats.recording import Reading, StatedStart
+from strapdown.formats.recording import Reading, Recording, StatedStart
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.navigation.measurements.gnss_readiness import without_repeats
 from strapdown.navigation.measurements.magnetometer import Magnetometer
@@ -122,7 +127,7 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
             tables[name], repeats = without_repeats(tables[name])
             findings += repeats
     for name, aid in spec.aiding.items():
-        own = of_samples(aid, imu)
+        own = of_samples(aid, imu, recording)
         if own is not None:
             tables[name] = own
     if points is not None:
@@ -264,23 +269,30 @@ def read_measured(
         repair=repair,
         stream=aid.stream,
     )
-    for column, option in stated.items():
+    if isinstance(aid, Magnetometer):
+        table = along_body(table, aid.axes)
+    return _with_sds(aid, table)
+
+
+def _with_sds(aid: TabulatedMeasurement, table: pd.DataFrame) -> pd.DataFrame:
+    """Return the table of a measurement with its standard deviations, which must be stated."""
+    for column, option in aid.sd_options().items():
         if column not in table and getattr(aid, option) == 0.0:
             key = next(o.key for o in options_of(type(aid)) if o.field == option)
             file = table.attrs["source"]
             raise DataError("navigation.aid-without-sd", file=file, quantity=column, key=key)
-    if isinstance(aid, Magnetometer):
-        table = along_body(table, aid.axes)
     return aid.converted(table)
 
 
-def of_samples(given: AidSpec, imu: pd.DataFrame) -> pd.DataFrame | None:
-    """Return the columns of the samples that a measurement without a file uses; else None."""
+def of_samples(given: AidSpec, imu: pd.DataFrame, recording: Recording) -> pd.DataFrame | None:
+    """Return the columns of the log that a measurement without a file uses; else None."""
     entry = SLOTS["aiding"].entries[given.kind]
     if given.path is not None or not issubclass(entry, TabulatedMeasurement):
         return None
     if not entry.of_samples:
         return None
+    if entry.stream == "wheel" and recording.wheel is not None:
+        return _with_sds(given.make(), wheel_table(recording))
     if not set(entry.columns) <= set(imu.columns):
         raise DataError(
             "navigation.no-such-columns-in-log", file=source_of(imu), columns=entry.columns

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from datetime import UTC, datetime
-from functools import cache
+from functools import cache, reduce
+from operator import xor
 
 import numpy as np
 import pandas as pd
@@ -272,3 +274,129 @@ def test_a_folder_of_a_phone_is_navigated_with_the_fixes_in_it(tmp_path):
     run = sd.navigate(made)
     run.save(tmp_path / "out", report=False)
     assert sd.verify(tmp_path / "out").verdict == "identical"
+
+
+# Two antennas, and wheels.
+
+EPOCH = datetime(2024, 5, 1, 10, tzinfo=UTC)
+#: From the antenna on the left to that on the right, and the noise of its heading, deg.
+ACROSS, OF_ANTENNAS = 90.0, 0.3
+
+
+def summed(body):
+    return f"${body}*{reduce(xor, body.encode(), 0):02X}"
+
+
+def receiver_of_two_antennas(path):
+    """Sentences of a receiver: its fixes, and behind each the heading of its antennas."""
+    fixes = streams()["gnss"]
+    sd.write({"gnss": fixes}, path, epoch=EPOCH)
+    heading = motion().trajectory(np.asarray(fixes.index))["heading"].to_numpy() + ACROSS
+    heading += OF_ANTENNAS * np.random.default_rng(7).standard_normal(len(fixes))
+    lines, k = [], 0
+    for line in path.read_text().splitlines():
+        lines.append(line)
+        if line.startswith("$GPRMC"):
+            clock = line.split(",")[1]
+            body = f"PASHR,{clock},{heading[k] % 360.0:.3f},T,,,,,,{OF_ANTENNAS},2,0"
+            lines.append(summed(body))
+            k += 1
+    path.write_text("\r\n".join([*lines, ""]))
+    return path
+
+
+@pytest.fixture(scope="module")
+def two_antennas(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("antennas")
+    sd.write({"imu": streams()["imu"]}, folder / "imu.mcap", epoch=EPOCH)
+    receiver_of_two_antennas(folder / "rover.nmea")
+    return folder
+
+
+def drafted(folder):
+    draft = draft_navigation(
+        LogTable(path=str(folder / "imu.mcap")), folder=folder, axes="x,-y,-z",
+        gnss=FixesTable(path=str(folder / "rover.nmea")), sensor="icm-42688-p",
+    )  # fmt: skip
+    return draft, tomllib.loads(draft.text)["aiding"]
+
+
+def test_the_angle_of_two_antennas_is_found_by_the_course(two_antennas):
+    draft, aiding = drafted(two_antennas)
+    assert draft.asked == ()
+    assert aiding["heading"] == {
+        "kind": "heading",
+        "path": "rover.nmea",
+        "axis_deg": pytest.approx(ACROSS, abs=0.5),
+        "misalignment_sd_deg": 5.0,
+    }
+    found = next(f for f in draft.findings if f.code == "navigation.baseline-angle")
+    assert found.data["angle"] == pytest.approx(ACROSS, abs=4.0 * found.data["sd"])
+    assert found.data["duration"] > 100.0
+    (shown,) = sd.doctor(two_antennas / "rover.nmea").data["logs"]
+    assert [stream["name"] for stream in shown["streams"]] == ["gnss", "heading"]
+
+
+def test_without_driving_the_angle_is_asked(two_antennas):
+    log, path = LogTable(path=str(two_antennas / "imu.mcap")), two_antennas / "rover.nmea"
+    parked = streams()["gnss"].assign(VN=0.0, VE=0.0)
+    tables, findings = propose_aids(log, sd.read_imu(log.path), parked, beside=str(path))
+    expected = {"kind": "heading", "path": str(path), "axis_deg": "?", "misalignment_sd_deg": 2.0}
+    assert (tables, findings) == ({"heading": expected}, ())
+    # Without standard deviations: 0.3° of noise, and 0.3° for 20 s in rows of a second.
+    bare = two_antennas / "bare.nmea"
+    other = r"\$PASHR,([^,]*),([^,]*),T[^*]*\*.."
+    lines = re.sub(other, lambda m: summed(f"PSAT,HPR,{m[1]},{m[2]},,,N"), path.read_text())
+    bare.write_text(lines)
+    tables, _ = propose_aids(log, sd.read_imu(log.path), None, beside=str(bare))
+    assert tables["heading"]["heading_sd_deg"] == pytest.approx(
+        np.hypot(OF_ANTENNAS, 0.3 * np.sqrt(40.0)), rel=0.1
+    )
+
+
+@pytest.mark.slow
+def test_two_antennas_hold_the_heading(two_antennas):
+    made = two_antennas / "navigate.toml"
+    made.write_text(drafted(two_antennas)[0].text, encoding="utf-8")
+    spec = NavigationSpec.read(made)
+    without = spec.model_copy(update={"aiding": {"gnss": spec.aiding["gnss"]}})
+    at = np.linspace(45.0, 178.0, 12)
+    truth = motion().trajectory(at)["heading"].to_numpy()
+    errors, bounds = [], []
+    for run in (run_navigation(without), run_navigation(spec)):
+        time = np.asarray(run.trajectory.index)
+        found = np.interp(at, time, np.unwrap(run.trajectory["heading"], period=360.0))
+        errors.append(rotation.within_half_turn(found - truth))
+        bounds.append(np.interp(at, run.sd.index, run.sd["heading"]))
+    assert np.square(errors[1] / bounds[1]).sum() < chi2.ppf(1.0 - 1e-4, at.size)
+    rms = np.sqrt(np.square(errors).mean(axis=1))
+    assert rms[1] < 0.7 * rms[0]
+    assert bounds[1].mean() < 0.7 * bounds[0].mean()
+
+
+@pytest.mark.slow
+def test_wheels_in_columns_of_the_log_hold_an_outage(tmp_path):
+    imu, fixes = streams()["imu"], streams()["gnss"]
+    table = pd.DataFrame({"time_s": imu.index})
+    for column, unit in zip([*GYRO, *ACCEL], ["rad_s"] * 3 + ["m_s2"] * 3, strict=True):
+        table[f"{column}_{unit}"] = imu[column].to_numpy()
+    moving = motion().trajectory(np.asarray(imu.index))
+    speed = 1.01 * np.hypot(moving["VN"], moving["VE"]).to_numpy()
+    table["vehicle_speed_kmh"] = np.repeat(3.6 * speed[::5], 5)[: len(table)]
+    table.to_csv(tmp_path / "drive.csv", index=False)
+    fixes.to_parquet(tmp_path / "fixes.parquet")
+    draft = draft_navigation(
+        LogTable(path=str(tmp_path / "drive.csv")), folder=tmp_path, axes="x,y,z",
+        gnss=FixesTable(path=str(tmp_path / "fixes.parquet")), sensor="icm-42688-p",
+    )  # fmt: skip
+    made = tmp_path / "navigate.toml"
+    spans = "\n[withhold]\nspans_s = [[100.0, 130.0]]\n"
+    made.write_text(draft.text + spans, encoding="utf-8")
+    spec = NavigationSpec.read(made)
+    assert spec.aiding["odometer"].path is None
+    without = spec.model_copy(update={"aiding": {"gnss": spec.aiding["gnss"]}})
+    alone, run = run_navigation(without), run_navigation(spec)
+    scale = run.sensor_errors.filter(like="odometer.scale_scale").iloc[-1]
+    assert scale.iloc[0] == pytest.approx(0.01, abs=0.005)
+    wide, narrow = (one.withheld[0].forward.horizontal.max() for one in (alone, run))
+    assert narrow < 0.6 * wide

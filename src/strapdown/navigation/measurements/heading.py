@@ -57,6 +57,7 @@ class Heading(TabulatedMeasurement):
     summary: ClassVar[str] = "heading of a compass or of two antennas, with its misalignment"
     source: ClassVar[str] = "Groves (2013), sec. 6.1"
     columns: ClassVar[tuple[str, ...]] = tuple(HEADING)
+    stream: ClassVar[str] = "heading"
 
     def __post_init__(self) -> None:
         for name in ("axis_deg", "added_deg"):

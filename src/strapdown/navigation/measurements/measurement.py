@@ -111,7 +111,7 @@ class TabulatedMeasurement(Measurement):
     units: ClassVar[Mapping[str, str]] = MappingProxyType({})
     #: Column from which the first one follows (`converted`), with its unit.
     instead: ClassVar[tuple[str, str] | None] = None
-    #: Whether its columns may be those of the samples: without a file.
+    #: Whether its columns may be in the log of the samples: without a file.
     of_samples: ClassVar[bool] = False
     #: Stream of a recording that has its measurements, of `formats.STREAMS`.
     stream: ClassVar[str] = ""

@@ -234,6 +234,7 @@ class Odometer(TabulatedMeasurement):
     source: ClassVar[str] = "Groves (2013), sec. 16.2"
     columns: ClassVar[tuple[str, ...]] = tuple(ODOMETER)
     stream: ClassVar[str] = "wheel"
+    of_samples: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_numbers(self, "lever_arm", 3)
