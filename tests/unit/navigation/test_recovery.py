@@ -548,25 +548,33 @@ def test_float_solutions_that_nothing_states_do_not_pull_the_solution():
     assert np.median(ratios) < 0.25
 
 
-@pytest.mark.parametrize("part", [0.25, 0.5, 1.0])
+@pytest.mark.parametrize("part", [0.25, 1.0])
 def test_float_solutions_that_are_understated_are_stated_by_how_they_jump(part):
-    """By what part they state; as stated they are left, and so are a few that say little."""
+    """Ten changes of three components that belong together: 0.24 of the logarithm of a size.
+
+    So that 5 % of those that are stated right seem to be 1.5 times as large: of 20, four at most.
+    """
     sizes = []
-    for seed in range(10):
+    for seed in range(20):
         table, loose = carrier_phase(seed, *LOOSE)
         table.loc[loose, POSITION_SD] = part * FLOAT_SD
         aid = town.gnss(float_position_sd=2.0 * FIXED_SD)
         found = stated_floats(solution(), table, aid)
-        if part == 1.0:
-            assert found is None
+        if found is None:
             continue
         out, same = found
         assert same == aid
         assert stated_floats(solution(), out, same) is None
         pd.testing.assert_frame_equal(out[~loose], table[~loose])
-        sizes.append(out.loc[loose, POSITION_SD].iloc[0].to_numpy() / FLOAT_SD)
-    # Ten changes of three components each: 0.18 of the logarithm of one.
-    assert np.abs(np.log(sizes)).max(initial=0.0) < 3.0 * 0.18
+        sizes.append(out.loc[loose, POSITION_SD].to_numpy().mean() / FLOAT_SD)
+    if part == 1.0:
+        assert len(sizes) <= 4
+    else:
+        assert len(sizes) == 20
+        assert abs(np.mean(np.log(sizes))) < 3.0 * 0.24 / np.sqrt(20)
+
+
+def test_two_stretches_of_float_solutions_do_not_show_their_size():
     table, loose = carrier_phase(0, LOOSE[0], LOOSE[2])
-    table.loc[loose, POSITION_SD] = part * FLOAT_SD
-    assert stated_floats(solution(), table, aid) is None
+    table.loc[loose, POSITION_SD] = 0.25 * FLOAT_SD
+    assert stated_floats(solution(), table, town.gnss(float_position_sd=2.0 * FIXED_SD)) is None
