@@ -509,21 +509,24 @@ def _with_jumps(
     for aid in chain.navigator.aids:
         if not isinstance(aid, Gnss):
             continue
-        best, least = None, LEAST_GAIN
-        for other, table, finding in _jumping(run.record, source.tables[aid.name], aid):
-            tables = {**source.tables, aid.name: table}
-            tried = _with_aid(chain, other), replace(source, tables=tables)
-            try:
-                again = drive(*tried)
-            except DivergenceError:
-                continue
-            gain, count = likelihood_gain(run.record.innovations, again.record.innovations)
-            if gain >= max(least, GAIN_EACH * count):
-                best, least = (*tried, again, finding), gain
+        before, least = run, LEAST_GAIN
+        best: tuple[NavigationPipeline, NavigationSource, Finding] | None = None
+        for _ in range(2):  # beside the repeated run, what jumps is clearer
+            for other, table, finding in list(_jumping(run.record, source.tables[aid.name], aid)):
+                tables = {**source.tables, aid.name: table}
+                tried = _with_aid(chain, other), replace(source, tables=tables)
+                try:
+                    again = drive(*tried)
+                except DivergenceError:
+                    continue
+                gain, count = likelihood_gain(before.record.innovations, again.record.innovations)
+                if gain > max(least, GAIN_EACH * count):
+                    best, least, run = (*tried, finding), gain, again
+            if best is None:
+                break
         if best is not None:  # a record may have both, each once
-            chain, source, run, finding = best
-            chain, run, source, more = _with_jumps(chain, run, source, drive)
-            return chain, run, source, (finding, *more)
+            chain, run, source, more = _with_jumps(*best[:1], run, best[1], drive)
+            return chain, run, source, (best[2], *more)
     return chain, run, source, ()
 
 
