@@ -63,7 +63,7 @@ from strapdown.systems.navigation_checks import ARM_SD
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.checks import ORIGIN_STATED, index_of, values_of
 
 #: Windows in which noise is measured, s, and the share taken as the quiet one.
 WINDOW, QUIET = 2.0, 0.05
@@ -175,6 +175,8 @@ JERK = 3.0
 #: Fixes better than this, m, show that a lever arm is measured by a tape. Velocities do where the
 #: body turns: its rate without vibration, by means over so many seconds.
 SHOWS_ARM, TURNING = 0.1, 0.2
+#: Standard deviation of a place that is stated for velocities alone, m, as one reads it off a map.
+ORIGIN_SD = 10.0
 #: Attributes of fixes with assumed standard deviations, and the keys of these.
 TAKEN = {"position_sd_taken": "position_sd_m", "velocity_sd_taken": "velocity_sd_m_per_s"}
 
@@ -271,8 +273,15 @@ def propose(
     place, start = site, recording.start
     if not place and start is not None:
         place = (start.lat_deg, start.lon_deg, start.alt)
+    placed = fixes is None or ORIGIN_STATED not in fixes.attrs
+    if not placed and site is None:
+        assert fixes is not None
+        lat, lon, alt = values_of(fixes, GEODETIC)[0].tolist()
+        place = (lat, lon, alt)
     if place is not None:
         table["site"] = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
+        if not placed:
+            table["site"]["position_sd_m"] = ORIGIN_SD
     progress("finding rests and noise", 0.3)
     until, drives = _motion(imu, fixes)
     quiet = _quiet(imu, until)
@@ -686,7 +695,7 @@ def _clock(
     if 0.5 * apart * span * speed > FAR * place_sd:
         walk = {"time_offset_drift_s_per_sqrt_s": float(f"{apart * math.sqrt(span):.1g}")}
     # Of what drives, windows show the offset; of a walk, turns and steps do, to its velocities.
-    slow = 0.0 if drives else _change_in_sd(fixes)
+    slow = 0.0 if drives and math.isfinite(place_sd) else _change_in_sd(fixes)
     if found is None:
         if drives or speed * OFFSET_SD > FAR * place_sd or slow * OFFSET_SD > FAR:
             out |= {"time_offset_sd_s": OFFSET_SD} | walk
