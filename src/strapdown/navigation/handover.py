@@ -335,8 +335,9 @@ def _here(
     covariance: Array,
 ) -> tuple[NavState, Array]:
     """Position of a vehicle at an instant, as of `here_by_fix`; by the site without positions."""
-    fixes, ellipsoid = _fixes(chain, state), find_ellipsoid(
-        chain.navigator.filter.mechanization.ellipsoid
+    fixes, ellipsoid = (
+        _fixes(chain, state),
+        find_ellipsoid(chain.navigator.filter.mechanization.ellipsoid),
     )
     if not _from_site(chain, state):
         return here_by_fix(fixes, time, q_nb, _lever_arm(chain), ellipsoid, velocity, covariance)

@@ -59,6 +59,7 @@ from strapdown.sensors.uncertainty import (
     stated_imu,
 )
 from strapdown.systems.alignment_source import body_record, gyro_unit_by_turns
+from strapdown.systems.named_sensor import unlike_sensor
 from strapdown.systems.navigation_checks import ARM_SD
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
@@ -296,6 +297,9 @@ def propose(
         sensors = _stated(table)
         if table["sensors"]["sensor"] in SCALED:
             table["states"] = {name: dict(SCALES) for name in ("gyro_scale", "accel_scale")}
+    if sensor is not None and sensors is not None:
+        known_place = None if place is None and fixes is None else _site(place, fixes)
+        findings = (*findings, *unlike_sensor(imu, quiet, sensor, sensors, known_place))
     rest = _rest(quiet, until, rocks=sensors is not None and _finds_north(sensors))
     if sensors is not None and rest < LEVELLED_IN_MOTION:
         # Nothing else says that a unit is better than its data sheet allows: by 20 deg/s the
@@ -575,6 +579,19 @@ def _quiet(imu: pd.DataFrame, until: float) -> list[tuple[float, float]]:
     part = imu[index_of(imu) <= first + until]
     found = find_rests_of_every_grade(part) if len(part) > 1 else ()
     return [(one.start - first, one.end - first) for one in found]
+
+
+def quiet_at_start(imu: pd.DataFrame, fixes: pd.DataFrame | None) -> list[tuple[float, float]]:
+    """Begin and end of each quiet stretch until the fixes prove motion, s from the first sample.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table.
+    fixes : DataFrame, optional
+        Gnss table on its clock; without it the sensors alone show a rest.
+    """
+    return _quiet(imu, _motion(imu, fixes)[0])
 
 
 def _rest(quiet: Sequence[tuple[float, float]], until: float, *, rocks: bool) -> float:

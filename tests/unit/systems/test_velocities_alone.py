@@ -83,19 +83,18 @@ def test_a_drive_by_velocities_alone(tmp_path):
 
 @pytest.mark.slow
 def test_bounds_of_drives_by_velocities_alone(tmp_path):
-    """At the end of each drive, by kind of error: at most a 1:1000 chance of the failures allowed.
+    """At the end of drives of cars, aircraft and boats, of every grade: position, velocity, tilt.
 
-    Of 16 drives (cars, aircraft, boats; every grade), three axes each, 46 of 48 position errors,
-    45 of velocity, 48 of attitude were within 95 % bounds.
+    All 24 errors of each kind are within 95 % bounds: receivers state more than they err by.
     """
     inside = np.zeros(len(COMPONENTS))
-    for seed in [s for s in range(40) if draw(s)["kind"] != "walk"][:16]:
+    for seed in [s for s in range(40) if draw(s)["kind"] != "walk"][:8]:
         made, origin = of_velocities(tmp_path / str(seed), seed)
         off, bound, *_ = navigated(made, origin, 0.1)
         inside += np.abs(off[-1]) < bound[-1]
         assert (np.abs(off) < 4.0 * bound)[:, [0, 1, 2, 6, 7, 8]].all(), seed
-    # Of 48 at 95 %, fewer than 40 have a chance of 1:1000.
-    assert (inside.reshape(3, 3).sum(axis=1) >= 40).all(), inside
+    # Of 24 at 95 %, fewer than 19 have a chance of 1:600.
+    assert (inside.reshape(3, 3).sum(axis=1) >= 19).all(), inside
 
 
 def test_speed_and_course_alone(tmp_path):
