@@ -619,15 +619,13 @@ def _unlike_named(
     if named is None:
         return ()
     fixes = next((t for t in source.tables.values() if set(GNSS) <= set(t.columns)), None)
-    site = None
-    if fixes is not None or spec.site is not None:
-        stated = spec.site
-        place = (
-            np.median(values_of(fixes, GEODETIC), axis=0).tolist()
-            if stated is None
-            else (stated.lat_deg, stated.lon_deg, stated.alt_m)
-        )
-        site = Site(*place, find_ellipsoid(spec.ellipsoid))
+    place = None
+    if spec.site is not None:
+        place = spec.site.lat_deg, spec.site.lon_deg, spec.site.alt_m
+    elif fixes is not None:
+        lat, lon, alt = np.median(values_of(fixes, GEODETIC), axis=0).tolist()
+        place = lat, lon, alt
+    site = None if place is None else Site(*place, find_ellipsoid(spec.ellipsoid))
     return unlike_sensor(source.imu, quiet_at_start(source.imu, fixes), named, sensors, site)
 
 
