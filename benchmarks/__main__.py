@@ -16,7 +16,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import commands, crash, filters, kernels
+from benchmarks import commands, crash, filters, kernels, proposed
 from benchmarks.measure import Row
 
 #: What `--only` chooses from.
@@ -33,6 +33,7 @@ GROUPS: dict[str, Callable[[], Iterator[Row]]] = {
     "bulk": crash.bulk,
     "reading": commands.text_table,
     "long-runs": commands.long_runs,
+    "proposed": proposed.times,
 }
 HEADINGS = ("what", "ours", "against", "theirs", "ratio", "goal", "limit", "")
 PAGE = Path(__file__).parents[1] / "docs" / "performance.md"

@@ -11,14 +11,17 @@ import pandas as pd
 from strapdown import rotation
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import NavigationSpec, make_filter
-from strapdown.navigation.integrity import assess_integrity
+from strapdown.frames import place_difference
+from strapdown.navigation.integrity import QUANTITIES, IntegrityReport, assess_integrity
 from strapdown.navigation.measurements.heading import Heading
 from strapdown.navigation.navigator import with_states
 from strapdown.navigation.pipeline import NavigationPipeline
+from strapdown.navigation.record import NavigationRecord
 from strapdown.navigation.replay import run_batch
 from strapdown.progress import silent
 from strapdown.systems.navigation_run import make_chain
 from strapdown.systems.navigation_source import NavigationSource, read_navigation_source
+from strapdown.tables import GEODETIC, VELOCITY
 
 LIMIT = 3.0
 KNOWN = 1.0  # deg, stated of the heading at the start
@@ -98,8 +101,54 @@ def started(case: Case) -> dict[str, object]:
     }
 
 
-def run(case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Light, error of the heading in deg, and bound of the run, second by second."""
+@dataclass
+class Judged:
+    """Status, and whether the error is beyond what trusted promises, of each second of a run.
+
+    `bound`: of the heading, deg. `others`: status and errors beyond, by the name of a quantity.
+    """
+
+    light: np.ndarray
+    wrong: np.ndarray
+    bound: np.ndarray
+    others: dict[str, tuple[np.ndarray, np.ndarray]]
+
+
+#: Innovations of a trusted quantity scatter at most twice as much as predicted; and the 99 % points
+#: of chi-square of one and of two components.
+TWICE, SURE = 2.0, {1: 6.635, 2: 9.210}
+
+
+def others(
+    record: NavigationRecord, report: IntegrityReport, truth: pd.DataFrame
+) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Status of position and velocity, and errors beyond twice their bound of 99 %."""
+    rows = record.trajectory
+    kept = truth.iloc[np.searchsorted(truth.index, rows.index - 1e-6).clip(0, len(truth) - 1)]
+    off = pd.DataFrame(
+        np.column_stack(
+            [
+                place_difference(rows[GEODETIC].to_numpy(), kept[GEODETIC].to_numpy()),
+                rows[VELOCITY].to_numpy() - kept[VELOCITY].to_numpy(),
+            ]
+        ),
+        index=rows.index,
+        columns=["north", "east", "down", *VELOCITY],
+    )
+    out = {}
+    for one in report.quantities:
+        columns = QUANTITIES[one.name][1]
+        time = one.table.index.to_numpy()
+        square = np.zeros(len(time))
+        for column in columns:
+            error = np.interp(time, off.index, off[column])
+            square += np.square(error / np.interp(time, record.sd.index, record.sd[column]))
+        out[one.name] = (one.table["status"].to_numpy(), square > TWICE**2 * SURE[len(columns)])
+    return out
+
+
+def run(case: Case) -> Judged:
+    """Navigate and judge, second by second."""
     spec: NavigationSpec = NavigationSpec.checked(started(case))
     source: NavigationSource = read_navigation_source(spec)
     sensors = sensors_of(spec)
@@ -123,4 +172,9 @@ def run(case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     )
     true = np.interp(time, source.truth.index, np.unwrap(np.radians(source.truth["heading"])))
     error = rotation.within_half_turn(np.degrees(own - true) - case.truth_turned)
-    return status["status"].to_numpy(), error, status["bound"].to_numpy()
+    return Judged(
+        status["status"].to_numpy(),
+        np.abs(error) > LIMIT,
+        status["bound"].to_numpy(),
+        others(record, report, source.truth),
+    )

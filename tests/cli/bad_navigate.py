@@ -229,6 +229,13 @@ def outage(time, values):
     return time[kept], values[kept]
 
 
+def _velocities(folder: Path) -> None:
+    write_drive(folder)
+    fixes = pd.read_csv(folder / "fixes.csv")
+    kept = [name for name in fixes.columns if "_m_s" in name or name == "time_s"]
+    fixes[kept].to_csv(folder / "fixes.csv", index=False)
+
+
 def _empty(folder: Path) -> None:
     write_drive(folder)
     (folder / "fixes.csv").write_text("")
@@ -262,6 +269,7 @@ NAVIGATE_CASES = (
     _fixes("Fixes a degree from the start", elsewhere),
     _fixes("No standard deviation of any place", no_sd_of_places, code=0),
     _fixes("Places in radians", radians),
+    NavigateCase("Velocities without positions", _velocities, "And no origin is stated."),
     NavigateCase("An empty file of fixes", _empty),
     _samples("A dead gyro", dead),
     _samples("Four seconds without samples", gap),

@@ -82,7 +82,7 @@ kind = "none"
 kind = "gnss"
 """
 STARTS = {"rest": REST + STANDS, "rocking": ROCKING + STANDS, "motion": DRIVE}
-RUNS = 12
+RUNS = 16
 
 
 @pytest.mark.slow

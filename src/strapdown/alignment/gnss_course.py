@@ -439,12 +439,13 @@ class CourseFit:
 
     def at_first_sample(
         self, found: CourseEstimate, gnss: pd.DataFrame
-    ) -> tuple[CourseEstimate, Array] | None:
+    ) -> tuple[CourseEstimate, Array | None] | None:
         """State at the first sample of the record, and its position (deg, deg, m).
 
         A navigation that begins there meets all fixes again: they count by a part of their weight
         (`ONCE`), so that its covariance owes next to nothing to them. `found`: by `search`. `gnss`:
-        whose first position that agrees with the others gives the position. None without one.
+        whose first position that agrees with the others gives the position. None without one; of
+        fixes that all have velocities alone the state has no position.
         """
         fixes, first = self.fixes, float(self.imu.index[0])
         if first < fixes.time[0]:
@@ -453,9 +454,9 @@ class CourseFit:
             errors[NOISE] = 0.0
             found = _converged(self, replace(found, errors=errors), Igg3())
         anchors = self._anchors(found, gnss)
-        if anchors is None:
+        if anchors is None and usable(gnss, POSITION_SD).any():
             return None
-        stamps, place, place_sd, origin = anchors
+        stamps = np.zeros(0) if anchors is None else anchors[0]
         seen = self._observed(found, np.append(stamps, first))
         k = len(fixes.time)
         share = ONCE * seen.told * found.weight[:, None] / np.square(found.scale * seen.sd)
@@ -467,29 +468,23 @@ class CourseFit:
         ]
         _, inverse, _ = _solve(parts, seen.prior, found.errors)
         here = len(seen.level) - 1
-        there = seen.velocity, seen.by_velocity
-        way, by_way = self._displacements(found, seen.sums, *there)
-        if self.by_places:
-            at, by_at, own = found.place + way[here], by_way[here], np.zeros(3)
-        else:
-            near = slice(here - len(stamps), here)
-            arm, by_arm = self._arms(found, seen.sums, seen.turns, near)
-            guess = place - (way[near] + arm) + way[here]
-            apart = guess - np.median(guess, axis=0)
-            usual = np.maximum(place_sd, MAD_TO_SD * np.median(np.abs(apart), axis=0))
-            j = int(np.argmax((np.abs(apart) <= CLEAR * usual).all(axis=1)))
-            at, by_at = guess[j], by_way[here] - (by_way[near] + by_arm)[j]
-            own = np.square(place_sd[j])
         level = seen.level[here]
         J = np.zeros((len(HANDED) + 3, self.unknowns))
         J[END_VELOCITY] = -level @ seen.by_velocity[here]
         J[TURN] = -level @ seen.turns[here]
         J[np.arange(GYRO_BIAS.start, len(HANDED)), HANDED[GYRO_BIAS.start :]] = 1.0
-        J[len(HANDED) :] = -by_at
+        geodetic = None
+        if anchors is None:
+            J = J[: len(HANDED)]
+        else:
+            at, by_at, own = self._first_place(found, seen, anchors)
+            geodetic = geodetic_from_ned(at, anchors[3], ellipsoid=self.site.ellipsoid)
+            J[len(HANDED) :] = -by_at
         # The shift by a wrong clock is left to the owner of that error.
         J[:, OFFSET] = 0.0
         covariance = self._at_an_end(J @ inverse @ J.T, seen.sums)
-        covariance[len(HANDED) :, len(HANDED) :] += np.diag(own)
+        if anchors is not None:
+            covariance[len(HANDED) :, len(HANDED) :] += np.diag(own)
         state = CourseEstimate(
             seen.C[here],
             level @ seen.velocity[here],
@@ -501,7 +496,28 @@ class CourseFit:
             found.onward,
             found.slip,
         )
-        return state, geodetic_from_ned(at, origin, ellipsoid=self.site.ellipsoid)
+        return state, geodetic
+
+    def _first_place(
+        self, found: CourseEstimate, seen: Observed, anchors: tuple[Array, Array, Array, Array]
+    ) -> tuple[Array, Array, Array]:
+        """Position at the first sample, its derivative, and the variance of the fix that gives it.
+
+        North, east, down of the origin of `anchors`, which are as of `_anchors`; `seen` ends with
+        them and the first sample.
+        """
+        stamps, place, place_sd, _ = anchors
+        here = len(seen.level) - 1
+        way, by_way = self._displacements(found, seen.sums, seen.velocity, seen.by_velocity)
+        if self.by_places:
+            return found.place + way[here], by_way[here], np.zeros(3)
+        near = slice(here - len(stamps), here)
+        arm, by_arm = self._arms(found, seen.sums, seen.turns, near)
+        guess = place - (way[near] + arm) + way[here]
+        apart = guess - np.median(guess, axis=0)
+        usual = np.maximum(place_sd, MAD_TO_SD * np.median(np.abs(apart), axis=0))
+        j = int(np.argmax((np.abs(apart) <= CLEAR * usual).all(axis=1)))
+        return guess[j], by_way[here] - (by_way[near] + by_arm)[j], np.square(place_sd[j])
 
     def _anchors(
         self, found: CourseEstimate, gnss: pd.DataFrame

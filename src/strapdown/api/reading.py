@@ -358,8 +358,9 @@ def read_gnss(
         Height over the ellipsoid of the level from which the file counts its heights: that of
         the geoid, or of the point of take-off.
     origin : tuple of float, or str, optional
-        Latitude in deg, longitude in deg and height in m of the origin of local positions; or the
-        zone of UTM of northings and eastings, with its hemisphere: ``33N``.
+        Latitude in deg, longitude in deg and height in m of the origin of local positions, or of
+        where velocities without positions begin; or the zone of UTM of northings and eastings, with
+        its hemisphere: ``33N``.
     position_sd_m, velocity_sd_m_per_s : float or tuple of float, optional
         Standard deviations north, east, down of each fix, replacing those of the file.
     repair : bool

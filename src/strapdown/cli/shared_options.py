@@ -157,7 +157,8 @@ class FixFlags:
         str | None,
         fixes(
             "LAT,LON,HEIGHT",
-            "Origin of local positions, deg, deg, m over the ellipsoid; or their UTM zone: 33N.",
+            "Origin of local positions, or where velocities without positions begin, deg, deg, m "
+            "over the ellipsoid; or the UTM zone: 33N.",
         ),
     ] = None
 

@@ -290,13 +290,15 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     Names may carry a unit, as ``lat_deg``, ``vN [km/h]``, ``sdU_m``; the default units are those of
     a Gnss table; `options.units` precede them. A column ``Q`` has the codes of RTKLIB,
     ``quality`` those of NMEA. A position is geodetic, Earth-centered Earth-fixed (ECEF), or local:
-    north, east, up of an origin that the user states. DataError: time or the position is missing,
-    two columns fit one quantity, or a unit is unknown.
+    north, east, up of an origin that the user states. Velocities without any position are at that
+    origin, which no fix measures. DataError: time or the position is missing, two columns fit one
+    quantity, or a unit is unknown.
     """
     found = _of_ublox(raw, fix_columns(raw, options.columns))
     found = _in_units(raw, found, options.units)
     raw = _rows_of_fixes(with_degrees(raw, found), found)
-    _refuse_missing(raw, found, stated=options.datum_height is not None)
+    alone = _velocities_alone(found)
+    _refuse_missing(raw, found, alone=alone, stated=options.datum_height is not None)
 
     used = {found["time"].source}
 
@@ -318,7 +320,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
 
     options, zone = _with_zone(raw, found, options)
     used.add(zone)
-    place, datum = _place(raw, found, values, options)
+    place, datum = _at_origin(raw, options) if alone else _place(raw, found, values, options)
     time, clock = _time(raw, found["time"], options.units.get("time"))
     if time.size > 2 and (np.diff(time) < 0.0).all():
         return fixes_of_columns(raw.backward(), options)
@@ -348,6 +350,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         time=time,
         place=place,
         rows=np.arange(1, time.size + 1) if raw.rows is None else raw.rows,
+        placed=not alone,
         clock=clock,
         velocity=velocity,
         position_sd=position_sd,
@@ -453,13 +456,30 @@ def _level(raw: RawLog, found: dict[str, Found], kind: str, options: GnssOptions
     return "" if own or _OVER_ELLIPSOID.search(found["alt"].source) else "open"
 
 
-def _refuse_missing(raw: RawLog, found: dict[str, Found], *, stated: bool) -> None:
+def _velocities_alone(found: Mapping[str, Found]) -> bool:
+    """Whether columns have the velocity over ground, and none has a part of a position."""
+    moving = {"VN", "VE"} <= found.keys() or {"speed", "course"} <= found.keys()
+    return moving and not found.keys() & {*_GEODETIC, *_ECEF, *_LOCAL}
+
+
+def _at_origin(raw: RawLog, options: GnssOptions) -> tuple[Array, str]:
+    """Return the stated origin as the place of every row of velocities alone, as of `_place`."""
+    origin = options.origin
+    if origin is None or isinstance(origin, str):  # a zone of UTM is no place
+        raise raw.fault("io.fixes-velocities-alone", "lat, lon", columns=list(raw.columns))
+    lat, lon, height = origin
+    raw.warn("io.fixes-placed-by-origin", "lat, lon", lat=lat, lon=lon, height=height)
+    return np.tile(origin, (next(iter(raw.columns.values())).size, 1)), "alt"
+
+
+def _refuse_missing(raw: RawLog, found: dict[str, Found], *, alone: bool, stated: bool) -> None:
     """Refuse a table without time or position; ask what nameless coordinates are.
 
-    `stated`: whether the user states a height, which a table without any then has.
+    `alone`: as of `_velocities_alone`. `stated`: whether the user states a height, which a table
+    without any then has.
     """
     missing = [q for q in ("time",) if q not in found]
-    if not any(set(one) <= found.keys() for one in (_GEODETIC, _ECEF, _LOCAL)):
+    if not alone and not any(set(one) <= found.keys() for one in (_GEODETIC, _ECEF, _LOCAL)):
         # Columns that are called x, y, z may be coordinates.
         bare = {m[1].lower(): n for n in raw.columns if (m := _AXIS.fullmatch(n.strip()))}
         if not missing and len(bare) == 3:

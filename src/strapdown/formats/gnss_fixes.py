@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,6 +18,7 @@ from strapdown.tables import gnss_table
 from strapdown.tables.checks import (
     GEODETIC,
     HEIGHTS_AS_STATED,
+    ORIGIN_STATED,
     POSITION_SD,
     VELOCITY,
     VELOCITY_SD,
@@ -71,7 +73,8 @@ class GnssOptions:
     #: the geoid, or of the point of take-off.
     datum_height: float | None = None
     #: Latitude and longitude, deg, and height, m, of the origin of local positions (``north east
-    #: up``); or the zone of UTM, with its hemisphere, of northings and eastings: ``33N``.
+    #: up``), or of where velocities without positions begin; or the zone of UTM, with its
+    #: hemisphere, of northings and eastings: ``33N``.
     origin: tuple[float, float, float] | str | None = None
     #: `position_sd`, `velocity_sd`: standard deviations north, east, down, or one for all three,
     #: for each fix; they replace those of the file. Where it states none for positions, but kinds
@@ -110,6 +113,8 @@ class Fixes:
     place: Array
     #: (n,): row of the file, counted from 1.
     rows: NDArray[np.int64]
+    #: Whether the file measures positions; else `place` is the origin that the user states.
+    placed: bool = True
     clock: Clock = field(default_factory=lambda: Clock(RELATIVE))
     #: `velocity`, `position_sd`, `velocity_sd`: (n, 3): north, east, down.
     velocity: Array | None = None
@@ -140,7 +145,13 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     count = fixes.time.size
     asked: Sd | None = options.position_sd
     taken: dict[str, float] = {}
-    if fixes.position_sd is None and asked is None and options.unstated_position_sd is not None:
+    if not fixes.placed:
+        if asked is not None:
+            raise ConfigError(
+                "io.position-sd-without-positions", file=fixes.name, quantity="position_sd_m"
+            )
+        asked = math.inf
+    elif fixes.position_sd is None and asked is None and options.unstated_position_sd is not None:
         asked = taken["position_sd_taken"] = options.unstated_position_sd
         if np.isinf(asked).all():
             add_warning(
@@ -170,6 +181,8 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     unstated = fixes.velocity is not None and fixes.velocity_sd is None and asked is None
     if unstated and options.unstated_velocity_sd is not None:
         asked = taken["velocity_sd_taken"] = options.unstated_velocity_sd
+    if not fixes.placed and fixes.velocity_sd is None and asked is None:
+        raise DataError("io.velocity-sd-alone", file=fixes.name, quantity=", ".join(VELOCITY_SD))
     velocity, velocity_sd = _velocity(fixes, asked, count)
     quality = np.ones(count) if fixes.quality is None else fixes.quality
     quality = np.where(np.isnan(quality), 0.0, quality)
@@ -207,6 +220,8 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     with_clock(table, fixes.clock)
     table.attrs["findings"] = tuple(fixes.findings)
     table.attrs.update(taken)
+    if not fixes.placed:
+        table.attrs[ORIGIN_STATED] = True
     if fixes.heights_from not in ("", NOWHERE) and not options.datum_height:
         table.attrs[HEIGHTS_AS_STATED] = True
     table.attrs["first_row"] = first_of(fixes.rows[at])

@@ -129,13 +129,11 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
         return from_fine(filter_, found.fine, rest, sd, shift, by_others)
     mode = chain.modes[state.mode]
     if isinstance(mode, CoarseMode) and isinstance(mode.way, GnssCourse):
-        ellipsoid = find_ellipsoid(filter_.mechanization.ellipsoid)
         course = found.alignment.earlier or found.alignment
         assert course.velocity is not None and course.joint is not None
         time, q_nb, velocity, joint = course.time, course.q_nb, course.velocity, course.joint
         if course.place is None:
-            arm, near = _lever_arm(chain), joint[:3, :3]
-            start, P = here_by_fix(_fixes(chain, state), time, q_nb, arm, ellipsoid, velocity, near)
+            start, P = _here(chain, state, time, q_nb, velocity, joint[:3, :3])
         else:
             lat, lon, alt = course.place.tolist()
             start = NavState(time, np.radians(lat), np.radians(lon), alt, velocity, q_nb)
@@ -146,7 +144,7 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
         return from_alignment(filter_, course, start, P, rest, by_others)
     fixes = _fixes(chain, state)
     moved, velocity_sd = None, np.array(chain.velocity_sd)
-    if chain.site is None:
+    if chain.site is None or _from_site(chain, state):
         shaken = any(finding.code == SHAKEN for finding in found.alignment.findings)
         clear = DOUBTFUL if shaken else CLEAR
         moved = motion_by_fixes(fixes, state.begun, state.time, clear)
@@ -215,15 +213,7 @@ def _in_motion(
     """
     filter_, q_nb = chain.navigator.filter, found.alignment.q_nb
     velocity, sd = moved
-    start, P = here_by_fix(
-        _fixes(chain, state),
-        state.time,
-        q_nb,
-        _lever_arm(chain),
-        find_ellipsoid(filter_.mechanization.ellipsoid),
-        velocity,
-        np.diag(np.square(sd)),
-    )
+    start, P = _here(chain, state, state.time, q_nb, velocity, np.diag(np.square(sd)))
     length = max(state.time - state.begun, INSTANT)
     tilt = math.hypot(*velocity[:2]) / (length * float(np.linalg.norm(rest[3:])))
     level = found.alignment.covariance + np.diag([tilt**2, tilt**2, 0.0])
@@ -265,10 +255,13 @@ def _by_antenna(
     if chain.fixes_from is None:
         return None
     arm, filter_, aid = _lever_arm(chain), chain.navigator.filter, _receiver(chain)
-    lasting = np.zeros(3)
-    if isinstance(aid, Gnss) and aid.lasts:
+    lasting, by_site = np.zeros(3), _from_site(chain, state)
+    if isinstance(aid, Gnss) and aid.lasts and not by_site:
         lasting = aid.lasting_sd(_good(_fixes(chain, state), POSITION_SD, state.time)[1][-1])
-    return errors_by_antenna(filter_, chain.fixes_from, q_nb, arm, velocity, turn, lasting)
+    out = errors_by_antenna(filter_, chain.fixes_from, q_nb, arm, velocity, turn, lasting)
+    if by_site:
+        out[DISPLACEMENT] = 0.0  # its position is not that of the antenna
+    return out
 
 
 def _turn(kept: Array, at: float) -> Array:
@@ -325,6 +318,37 @@ def _site(
     place = geodetic_from_ned(-rotate(q_nb, arm), antenna, ellipsoid=ellipsoid)
     lat_deg, lon_deg, alt = place.tolist()
     return Site(lat_deg, lon_deg, alt, ellipsoid), sd
+
+
+def _from_site(chain: NavigationPipeline, state: PipelineState) -> bool:
+    """Whether the fixes have velocities alone, so that the way begins at the stated site."""
+    fixes = _fixes(chain, state)
+    return chain.site is not None and fixes is not None and not usable(fixes, POSITION_SD).any()
+
+
+def _here(
+    chain: NavigationPipeline,
+    state: PipelineState,
+    time: float,
+    q_nb: Array,
+    velocity: Array,
+    covariance: Array,
+) -> tuple[NavState, Array]:
+    """Position of a vehicle at an instant, as of `here_by_fix`; by the site without positions."""
+    fixes, ellipsoid = (
+        _fixes(chain, state),
+        find_ellipsoid(chain.navigator.filter.mechanization.ellipsoid),
+    )
+    if not _from_site(chain, state):
+        return here_by_fix(fixes, time, q_nb, _lever_arm(chain), ellipsoid, velocity, covariance)
+    assert chain.site is not None and fixes is not None
+    way, variance = way_by_velocities(fixes, state.begun, time, velocity)
+    site = np.array([chain.site.lat_deg, chain.site.lon_deg, chain.site.alt])
+    lat, lon, alt = geodetic_from_ned(way, site, ellipsoid=ellipsoid).tolist()
+    P = np.zeros((6, 6))
+    P[:3, :3] = np.diag(np.square(chain.site_sd) + variance)
+    P[3:, 3:] = covariance
+    return NavState(time, np.radians(lat), np.radians(lon), alt, velocity, q_nb), P
 
 
 def _receiver(chain: NavigationPipeline) -> Measurement | None:
@@ -762,6 +786,44 @@ def here_by_fix(
     P[:3, 3:] = P[3:, :3] = velocity_covariance * after
     P[3:, 3:] = velocity_covariance
     return state, P
+
+
+def way_by_velocities(
+    fixes: pd.DataFrame, begin: float, time: float, velocity: Array
+) -> tuple[Array, Array]:
+    """Return the way of a receiver since an instant, by its velocities.
+
+    Parameters
+    ----------
+    fixes : DataFrame
+        Fixes until `time`; those before `begin` are of a part that was navigated before, at whose
+        first one the way begins.
+    begin, time : float, s
+    velocity : ndarray, (3,), m/s
+        At `time`, north, east, down.
+
+    Returns
+    -------
+    way, variance : ndarray, (3,), m and m²
+        North, east, down, by trapezoids. In each step the acceleration is unknown, 1 m/s²; a climb
+        that no fix measures is 1 m/s for all of the way.
+    """
+    told = usable(fixes, VELOCITY_SD[:2])
+    stamps, v = index_of(fixes)[told], values_of(fixes, VELOCITY_COLUMNS)[told]
+    begin = min(begin, float(stamps[0])) if stamps.size else begin
+    span = max(time - begin, 0.0)
+    before = (stamps > begin) & (stamps < time)
+    at = np.concatenate([[begin], stamps[before], [begin + span]])
+    known, stamps = np.vstack([v, velocity]), np.append(stamps, begin + span)
+    way = np.array([np.trapezoid(np.interp(at, stamps, one), at) for one in known.T])
+    steps = np.diff(at)
+    variance = np.full(3, np.square(0.5 * MANOEUVRE * steps**2).sum())
+    sd = values_of(fixes, VELOCITY_SD)[told]
+    measured = np.isfinite(sd)
+    each = np.square(np.where(measured, sd, 0.0)).max(axis=0, initial=0.0)
+    return way, variance + np.where(
+        measured.all(axis=0), each * np.square(steps).sum(), (CLIMB * span) ** 2
+    )
 
 
 def motion_by_fixes(

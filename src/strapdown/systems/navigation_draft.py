@@ -510,9 +510,14 @@ def _where(page: Page, made: Proposal, foot: bool) -> list[str]:
     said = made.table.get("site")
     where = "Position of the body during alignment."
     if said is not None:
-        page.table("[site]", where, "Found: the log states it; check that it is so.")
+        found = "Found: the log states it; check that it is so."
+        if SITE_SD in said:
+            found = "The origin that is stated for the fixes: the way is dead reckoning from there."
+        page.table("[site]", where, found)
         for key, value in said.items():
-            page.key(key, repr(value))
+            sd = key == SITE_SD
+            remark = "assumed: as of a map; it is in every bound of the position" if sd else ""
+            page.key(key, repr(value), remark, check="how well that place is known" if sd else "")
         return [f"position: {said['lat_deg']:.6f}°, {said['lon_deg']:.6f}°"]
     if made.gnss is not None:
         page.blank()
@@ -662,7 +667,7 @@ def _whole() -> list[Any]:
     return [s for s in map(load_sensor, SENSORS) if s.grade != "crash"]
 
 
-BIAS = "bias_sd_deg_per_h"
+BIAS, SITE_SD = "bias_sd_deg_per_h", "position_sd_m"
 #: Noise of a unit over that of its data sheet, which is typical of the type.
 SPREAD = 1.25
 #: Ready-made tables for a vehicle.

@@ -60,11 +60,12 @@ from strapdown.sensors.uncertainty import (
     stated_imu,
 )
 from strapdown.systems.alignment_source import body_record, gyro_unit_by_turns
+from strapdown.systems.named_sensor import unlike_sensor
 from strapdown.systems.navigation_checks import ARM_SD
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.checks import ORIGIN_STATED, index_of, values_of
 
 #: Windows in which noise is measured, s, and the share taken as the quiet one.
 WINDOW, QUIET = 2.0, 0.05
@@ -176,6 +177,8 @@ JERK = 3.0
 #: Fixes better than this, m, show that a lever arm is measured by a tape. Velocities do where the
 #: body turns: its rate without vibration, by means over so many seconds.
 SHOWS_ARM, TURNING = 0.1, 0.2
+#: Standard deviation of a place that is stated for velocities alone, m, as one reads it off a map.
+ORIGIN_SD = 10.0
 #: Attributes of fixes with assumed standard deviations, and the keys of these.
 TAKEN = {"position_sd_taken": "position_sd_m", "velocity_sd_taken": "velocity_sd_m_per_s"}
 
@@ -272,8 +275,15 @@ def propose(
     place, start = site, recording.start
     if not place and start is not None:
         place = (start.lat_deg, start.lon_deg, start.alt)
+    placed = fixes is None or ORIGIN_STATED not in fixes.attrs
+    if not placed and site is None:
+        assert fixes is not None
+        lat, lon, alt = values_of(fixes, GEODETIC)[0].tolist()
+        place = (lat, lon, alt)
     if place is not None:
         table["site"] = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
+        if not placed:
+            table["site"]["position_sd_m"] = ORIGIN_SD
     progress("finding rests and noise", 0.3)
     until, drives = _motion(imu, fixes)
     quiet = _quiet(imu, until)
@@ -288,6 +298,9 @@ def propose(
         sensors = _stated(table)
         if table["sensors"]["sensor"] in SCALED:
             table["states"] = {name: dict(SCALES) for name in ("gyro_scale", "accel_scale")}
+    if sensor is not None and sensors is not None:
+        known_place = None if place is None and fixes is None else _site(place, fixes)
+        findings = (*findings, *unlike_sensor(imu, quiet, sensor, sensors, known_place))
     rest = _rest(quiet, until, rocks=sensors is not None and _finds_north(sensors))
     if sensors is not None and rest < LEVELLED_IN_MOTION:
         # Nothing else says that a unit is better than its data sheet allows: by 20 deg/s the
@@ -569,6 +582,19 @@ def _quiet(imu: pd.DataFrame, until: float) -> list[tuple[float, float]]:
     return [(one.start - first, one.end - first) for one in found]
 
 
+def quiet_at_start(imu: pd.DataFrame, fixes: pd.DataFrame | None) -> list[tuple[float, float]]:
+    """Begin and end of each quiet stretch until the fixes prove motion, s from the first sample.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table.
+    fixes : DataFrame, optional
+        Gnss table on its clock; without it the sensors alone show a rest.
+    """
+    return _quiet(imu, _motion(imu, fixes)[0])
+
+
 def _rest(quiet: Sequence[tuple[float, float]], until: float, *, rocks: bool) -> float:
     """Length of the initial rest in s, in which gyros and accelerometers agree with the fixes.
 
@@ -688,7 +714,7 @@ def _clock(
     if 0.5 * apart * span * speed > FAR * place_sd:
         walk = {"time_offset_drift_s_per_sqrt_s": float(f"{apart * math.sqrt(span):.1g}")}
     # Of what drives, windows show the offset; of a walk, turns and steps do, to its velocities.
-    slow = 0.0 if drives else _change_in_sd(fixes)
+    slow = 0.0 if drives and math.isfinite(place_sd) else _change_in_sd(fixes)
     if found is None:
         if drives or speed * OFFSET_SD > FAR * place_sd or slow * OFFSET_SD > FAR:
             out |= {"time_offset_sd_s": OFFSET_SD} | walk

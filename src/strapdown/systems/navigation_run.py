@@ -79,7 +79,9 @@ from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.inputs import Memory, SavedRun, configuration_file
+from strapdown.systems.named_sensor import unlike_sensor
 from strapdown.systems.navigation_checks import channel_findings, look_through, saturated_findings
+from strapdown.systems.navigation_proposal import quiet_at_start
 from strapdown.systems.navigation_source import (
     UNSTATED,
     NavigationSource,
@@ -88,7 +90,7 @@ from strapdown.systems.navigation_source import (
     said_of_file,
 )
 from strapdown.systems.one_thread import one_thread
-from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY, usable
+from strapdown.tables import EULER, GEODETIC, GNSS, POSITION_SD, VELOCITY, usable
 from strapdown.tables.checks import index_of, source_of, values_of
 from strapdown.tables.on_disk import tidy
 
@@ -183,6 +185,7 @@ def run_navigation(
             channels = saturated_findings(source.imu, sensors)
         else:
             channels = channel_findings(source.imu, sensors, spec.start, source.tables)
+            channels = (*channels, *_unlike_named(spec, sensors, source))
     looked, channels = in_file(looked, *tables), in_file(channels, *tables)
     tidy()
     chain = _switched_on(make_chain(spec, sensors), float(source.imu.index[0]))
@@ -650,6 +653,24 @@ def _known_offset(aid: Gnss, error: pd.Series, sd: pd.Series) -> tuple[float, fl
     if (apart > SURELY**2 * expected).any() or again > BETTER * aid.time_offset_sd:
         return None
     return last, again
+
+
+def _unlike_named(
+    spec: NavigationSpec, sensors: ImuUncertainty, source: NavigationSource
+) -> tuple[Finding, ...]:
+    """Report a rest that is not of the sensor that is named, however well its noise is stated."""
+    named = spec.sensors.sensor
+    if named is None:
+        return ()
+    fixes = next((t for t in source.tables.values() if set(GNSS) <= set(t.columns)), None)
+    place = None
+    if spec.site is not None:
+        place = spec.site.lat_deg, spec.site.lon_deg, spec.site.alt_m
+    elif fixes is not None:
+        lat, lon, alt = np.median(values_of(fixes, GEODETIC), axis=0).tolist()
+        place = lat, lon, alt
+    site = None if place is None else Site(*place, find_ellipsoid(spec.ellipsoid))
+    return unlike_sensor(source.imu, quiet_at_start(source.imu, fixes), named, sensors, site)
 
 
 def _explained_by_grade(

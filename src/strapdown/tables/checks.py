@@ -273,6 +273,8 @@ REFERENCE = ["time", "kind", "since", *EULER, "turns", "axis", "sd"]
 #: Attribute of Gnss and Trajectory tables whose heights count from the level of the file, which
 #: may be the sea, and not from the ellipsoid.
 HEIGHTS_AS_STATED = "heights_as_stated"
+#: Attribute of Gnss tables of velocities alone: their place is the origin that the user stated.
+ORIGIN_STATED = "origin_stated"
 
 
 def height_words(*, as_stated: bool) -> str:

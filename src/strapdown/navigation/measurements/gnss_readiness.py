@@ -31,7 +31,7 @@ from strapdown.tables import (
     find_gaps,
     usable,
 )
-from strapdown.tables.checks import index_of, source_of, values_of
+from strapdown.tables.checks import ORIGIN_STATED, index_of, source_of, values_of
 
 
 def gnss_readiness(
@@ -306,13 +306,14 @@ def check_fixes(table: pd.DataFrame) -> list[Finding]:
     placed, fast = usable(table, POSITION_SD), usable(table, VELOCITY_SD)
     if not len(time):
         raise DataError("navigation.no-fixes", file=source, quantity="time")
-    if not (placed | fast).any():
+    told = placed | usable(table, VELOCITY_SD[:2])  # many have speed and course only
+    if not told.any():
         raise DataError(
             "navigation.none-rows-fix-quality-or", file=source, quantity="quality", count=len(time)
         )
     _refuse_units(table, time, placed, source)
-    found = [*_certain(table, source), *_gaps(time, placed | fast, source)]
-    if not placed.any():
+    found = [*_certain(table, source), *_gaps(time, told, source)]
+    if not placed.any() and ORIGIN_STATED not in table.attrs:
         found.append(
             Finding(
                 "navigation.no-place-used-none-rows",
