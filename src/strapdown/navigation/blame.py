@@ -42,8 +42,8 @@ CONTINUED, STEPPED = 0.05, 5.0
 LONGEST, PART, BEFORE = 360.0, 300.0, 0.6
 #: Standard deviations at the begin of that part: position, m, velocity, m/s, tilt and heading, deg.
 BEGIN_SD = 10.0, 1.0, 5.0, 20.0
-#: Part of the misfit that the best leaves, above which axes turned about the vertical are tested,
-#: and part of the components that two runs must have in common.
+#: Part of the misfit of the run that an explanation leaves at most, and part of the components that
+#: two runs must have in common. Axes that are turned about the vertical are tested without one.
 LEAVES, COMMON = 0.5, 0.5
 #: Hypotheses that are listed after the best.
 NEXT = 2
@@ -185,19 +185,16 @@ def blame(
     for k, one in enumerate(hypotheses):
         tested += bench.test(one, k / (len(hypotheses) + 1))
     for grade, other in coarser:
-        found = bench.test(_of_grade(bench, named, grade, other), 1.0)
-        better = not tested or any(x.gain > max(y.gain for y in tested) for x in found)
-        tested += found
-        if not better:
-            break
-    unexplained = min([misfit(bench.record), *(one.left for one in tested if one.gain > 0.0)])
-    if aid is not None and unexplained > LEAVES * misfit(bench.record):
+        tested += bench.test(_of_grade(bench, named, grade, other), 1.0)
+    allowed = LEAVES * misfit(bench.record)
+    if aid is not None and not any(one.left < allowed for one in tested):
         for name, matrices in TURNED.items():
             tested += bench.test(_of_axes(bench, name, matrices), 1.0)
-    ranked = sorted(tested, key=lambda one: -one.gain)
-    if not ranked or ranked[0].gain < _enough(ranked[0].count):
+    # One that leaves most of it explains nothing, though it may do so better than the run.
+    tested.sort(key=lambda one: (one.left >= allowed, -one.gain))
+    if not tested or tested[0].left >= allowed or tested[0].gain < _enough(tested[0].count):
         return ()
-    return (_named(ranked, bench, aid),)
+    return (_named(tested, bench, aid),)
 
 
 def misfit(record: NavigationRecord) -> float:

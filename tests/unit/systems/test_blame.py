@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
+import pytest
 
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import NavigationSpec
 from strapdown.frames import geodetic_from_ned
-from strapdown.navigation.blame import blame
+from strapdown.navigation import blame as blaming
+from strapdown.navigation.blame import blame, misfit
 from strapdown.navigation.recorder import IntervalRecorder
 from strapdown.navigation.replay import run_batch
 from strapdown.progress import silent
+from strapdown.report.navigation_evaluation import NavigationEvaluation, trust
 from strapdown.systems.navigation_run import (
     _coarser,
     _with_settled_offsets,
     _without_displacements,
     make_chain,
+    run_navigation,
 )
 from strapdown.systems.navigation_source import read_navigation_source
 from strapdown.tables import ACCEL, GEODETIC, GYRO
@@ -105,7 +111,7 @@ def given(fault, seed):
         away = rng.normal(size=3)
         more["arm"] = ARM + 3.4 * away / np.linalg.norm(away)
     if fault == "sensor":
-        more = {"named": "hg1700", "real": "mpu-6050"}
+        more = {"named": "hg1700", "real": "bmi160"}
     if fault == "offset":
         more = {"clock_sd": 0.0}
     spec = specified(seed, **more)
@@ -152,3 +158,81 @@ def short(found):
     """Code of a finding without what all have in common."""
     assert len(found) <= 1
     return found[0].code.removeprefix("navigation.").removeprefix("blame-") if found else ""
+
+
+def beyond(fault, found):
+    """Errors of what was found, in standard deviations; of the arm, and of the clock."""
+    if fault == "arm":
+        data = found[0].data
+        return np.abs(np.array(data["arm"]) - ARM) / np.array(data["sd"])
+    if fault in ("offset", "step"):
+        return np.abs([found[0].data["offset"] - 1.0]) / found[0].data["offset_sd"]
+    return np.zeros(1)
+
+
+@pytest.mark.parametrize("fault", ["arm", "stretch"])
+def test_what_is_wrong_is_named(fault):
+    """With its numbers; the best is first, and leaves little to be explained."""
+    found, _, record = answered(fault, 1)
+    assert short(found) == EXPECTED[fault]
+    data = found[0].data
+    assert list(data["gains"]) == sorted(data["gains"], reverse=True)
+    assert data["gain"] == data["gains"][0] > 100.0
+    assert data["scatter_left"] < 1.2 < data["scatter"]
+    assert (beyond(fault, found) < 4.0).all()
+    if fault == "stretch":
+        assert (data["since"], data["until"]) == pytest.approx((25.0, 40.0), abs=1.5)
+    assert misfit(record) > 100.0
+    assert found[0].sentence()
+    assert found[0].advice("file")
+
+
+def test_a_long_record_is_tested_by_a_part(monkeypatch):
+    """Of half a minute, that begins with the state of the run."""
+    monkeypatch.setattr(blaming, "LONGEST", 30.0)
+    monkeypatch.setattr(blaming, "PART", 30.0)
+    found, _, record = answered("arm", 1)
+    assert short(found) == "lever-arm"
+    whole = sum(len(table) * 3 for table in record.innovations.values())
+    assert found[0].data["count"] < 0.6 * whole
+    assert (beyond("arm", found) < 4.0).all()
+
+
+def test_a_sound_run_is_not_repeated(monkeypatch):
+    monkeypatch.setattr(blaming, "run_batch", pytest.fail)
+    run = run_navigation(specified(1))
+    assert not [f for f in run.findings if f.code in blaming.BLAMES]
+
+
+def test_an_offset_that_the_arm_explains_is_no_fact():
+    """The run was repeated with −0.11 s, with a small bound, where the clocks agree."""
+    spec, _, _ = given("arm", 8)
+    run = run_navigation(spec)
+    told = {f.code.partition(".")[2]: f.data for f in run.findings}
+    assert next(iter(told)) == "blame-lever-arm"
+    assert not any(code.startswith("run-again-with") and "offset" in code for code in told)
+    data = told["offset-not-of-clock"]
+    assert data["offset"] < -0.05
+    assert abs(data["found"]) < 4.0 * data["sd"] < 0.05
+    assert trust(NavigationEvaluation(run)).verdict == "distrusted"
+
+
+def test_nothing_is_tested_of_a_run_that_is_not_to_be_repeated(monkeypatch):
+    monkeypatch.setattr(blaming, "run_batch", pytest.fail)
+    spec, _, _ = given("arm", 1)
+    spec = spec.model_copy(update={"trust": spec.trust.model_copy(update={"repeat": False})})
+    assert not [f for f in run_navigation(spec).findings if f.code in blaming.BLAMES]
+
+
+@pytest.mark.slow
+def test_the_confusion_of_faults():
+    """TABLE"""
+    table = {fault: Counter[str]() for fault in EXPECTED}
+    for fault, counts in table.items():
+        for seed in range(1, 21):
+            found, _, _ = answered(fault, seed)
+            counts[short(found)] += 1
+            if short(found) == EXPECTED[fault]:
+                assert (beyond(fault, found) < 4.5).all(), (fault, seed)
+    for fault, counts in table.items():
+        assert counts[EXPECTED[fault]] >= LEAST.get(fault, 20), table
