@@ -173,7 +173,8 @@ def blame(
         these are not so far from it that one could.
     """
     count = _count(record)
-    if misfit(record) < _enough(count):
+    # Of what one leaves half at most, half is to be enough.
+    if misfit(record) < _enough(count) / LEAVES:
         return ()
     stretch = _worst(record, chain)
     bench = _Bench(asked, chain, imu, tables, record, progress)

@@ -641,6 +641,8 @@ def _not_of_clock(
 ) -> tuple[Finding, ...]:
     """Return what was found of clocks, as no fact where another explanation finds another."""
     for best in blamed:
+        if best.code.startswith("navigation.blame-clock"):
+            continue
         found, sd = (best.data.get(key, math.nan) for key in ("offset", "offset_sd"))
         by_offset = tuple(
             Finding("navigation.offset-not-of-clock", quantity=one.quantity, data=more)
