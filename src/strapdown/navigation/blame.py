@@ -179,7 +179,10 @@ def blame(
     stretch = _worst(record, chain)
     bench = _Bench(asked, chain, imu, tables, record, progress)
     if float(imu.index[-1] - imu.index[0]) > LONGEST:
-        bench = bench.part(stretch)
+        try:
+            bench = bench.part(stretch)
+        except StrapdownError:
+            return ()
     tested: list[Tested] = []
     aid = _receiver(chain, tables)
     hypotheses = [] if aid is None else _of_receiver(bench, aid, stretch)
@@ -263,8 +266,9 @@ class _Bench:
             for columns, matrix in zip((GYRO, ACCEL), turned, strict=True):
                 imu[columns] = values_of(self.imu, columns) @ matrix.T
         bare = replace(chain, navigator=replace(chain.navigator, smoother=None))
+        own = self.chain
         return run_batch(
-            replace(bare, start=self.chain.start, modes=self.chain.modes),
+            replace(bare, start=own.start, modes=own.modes, commands=own.commands),
             imu,
             tables,
             IntervalRecorder(rate_hz=1.0),
