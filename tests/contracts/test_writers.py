@@ -29,6 +29,7 @@ from strapdown.tables import (
     QUATERNION,
     attitude_table,
     gnss_table,
+    heading_table,
     imu_table,
     trajectory_table,
 )
@@ -99,6 +100,7 @@ def streams(clock: str = "unix", sampling: str = "instantaneous") -> dict[str, p
     wheel = pd.DataFrame({"speed": np.full(at.size, speed)}, index=pd.Index(at, name="time"))
     made = {"imu": imu, "gnss": gnss, "reference": reference}
     made |= {"magnetometer": mag, "barometer": barometer, "wheel": wheel}
+    made["heading"] = heading_table(at, (heading[fixes] + 90.0) % 360.0, 0.25)
     return {name: on(table, clock) for name, table in made.items()}
 
 

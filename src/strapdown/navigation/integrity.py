@@ -512,6 +512,9 @@ def repeat_without(
 
 #: A squared innovation counts at most so many times its variance in a likelihood.
 MOST = 25.0
+#: Gain in the logarithm of the likelihood from which another run explains a record: in all, and
+#: for each component. Innovations are correlated: a record has fewer independent ones.
+LEAST_GAIN, GAIN_EACH = 20.0, 0.05
 
 
 def likelihood_gain(
@@ -553,6 +556,16 @@ def likelihood_gain(
         gain += 0.5 * float(np.sum(size[0] - size[1]))
         count += int(told.sum())
     return gain, count
+
+
+def rejected_percent(record: NavigationRecord) -> float:
+    """Return the share of the components of all measurements that were rejected, percent."""
+    weights = [
+        values_of(table, [f"weight {label}" for label in innovation_labels(table)])
+        for table in record.innovations.values()
+    ]
+    flat = np.concatenate([np.empty(0), *(one.ravel() for one in weights)])
+    return 100.0 * float(np.mean(flat <= 0.0)) if len(flat) else 0.0
 
 
 def _changed(

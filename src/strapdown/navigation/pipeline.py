@@ -15,6 +15,7 @@ from strapdown.alignment.alignment import Site
 from strapdown.errors import ConfigError, DataError, DivergenceError, check_choice
 from strapdown.estimation.error_filter import FilterState
 from strapdown.navigation.handover import align, from_state, handed_over, unused_fixes
+from strapdown.navigation.measurements.measurement import Measurement
 from strapdown.navigation.modes import (
     Aligned,
     CoarseMode,
@@ -25,7 +26,7 @@ from strapdown.navigation.modes import (
     PipelineChunk,
     check_timeline,
 )
-from strapdown.navigation.navigator import Navigator, NavigatorState
+from strapdown.navigation.navigator import Navigator, NavigatorState, with_aids
 from strapdown.navigation.preprocessing import (
     Hole,
     ImuIncrements,
@@ -786,3 +787,9 @@ class ModeSequencer:
             told=state.told if anew else dict.fromkeys(state.told, ()),
             deliveries=chain.deliveries.started(state.deliveries, begun.time),
         )
+
+
+def with_aid(chain: NavigationPipeline, aid: Measurement) -> NavigationPipeline:
+    """Return a pipeline with other options of the aid of this name, and the states they state."""
+    aids = tuple(aid if one.name == aid.name else one for one in chain.navigator.aids)
+    return replace(chain, navigator=with_aids(chain.navigator, aids))

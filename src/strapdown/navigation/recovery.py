@@ -45,8 +45,6 @@ ALIKE = 0.5
 #: end once in so long, s.
 FLOATS, APART, LARGER, UNDERSTATED = 4.0, 30.0, 3.0, 1.5
 BEGINS, ENDS = 60.0, 10.0
-#: Quality of a float solution in NMEA 0183 GGA.
-FLOAT = 5
 #: Passes over the steps, each with the sizes of the last; share of fixed solutions that are gross
 #: errors; median of chi-square of three components; chance below which a solution is fixed.
 PASSES, GROSS, CHI_MEDIAN, UNLIKELY = 10, 0.02, 2.366, 0.1
@@ -219,7 +217,7 @@ def stated_floats(
     Returns
     -------
     table : DataFrame
-        With the standard deviations and the quality of float solutions, where they are.
+        With the standard deviations of float solutions, where they are.
     aid : Gnss
         With the `float_position_sd` that separates them. None where there are none, or as stated.
     """
@@ -249,8 +247,7 @@ def stated_floats(
         larger = np.maximum(own[floats], sd / aid.position_sd_factor)
         limit = math.sqrt(float(np.median(level)) * math.hypot(*larger[0, :2] / math.sqrt(2.0)))
     out = table.copy()
-    where = table.columns.get_indexer(pd.Index([*POSITION_SD, "quality"]))
-    out.iloc[rows[floats], where] = np.column_stack([larger, np.full(len(larger), FLOAT)])
+    out.iloc[rows[floats], table.columns.get_indexer(pd.Index(POSITION_SD))] = larger
     return out, replace(aid, float_position_sd=limit)
 
 
@@ -271,7 +268,8 @@ def _floats(square: Array, dt: Array, usual: Array) -> tuple[NDArray[np.bool_], 
         between = square[floats[1:] != floats[:-1]]
         if len(within) < FEWEST or len(between) < 2:
             return np.zeros_like(floats), usual
-        looser, apart = (math.sqrt(np.nanmedian(each) / CHI_MEDIAN) for each in (within, between))
+        looser = math.sqrt(max(1.0, np.nanmedian(within) / CHI_MEDIAN))
+        apart = math.sqrt(max(looser**2, np.nanmedian(between) / CHI_MEDIAN))
     # A fixed solution that is taken for a float one costs little.
     return np.asarray(chance > UNLIKELY), apart * usual
 
@@ -299,7 +297,7 @@ def _chance_of_floats(square: Array, dt: Array, looser: float, apart: float) -> 
     # A gross error of a fixed solution, now and then, is none.
     fixed = np.logaddexp(likely(1.0) + math.log(1.0 - GROSS), likely(JUMPED) + math.log(GROSS))
     begin, end = np.minimum(dt / BEGINS, 0.5), np.minimum(dt / ENDS, 0.5)
-    change = likely(max(apart, looser))
+    change = likely(apart)
     # By kind before and after, relative to the likeliest.
     ways = np.empty((len(dt), 2, 2))
     ways[:, 0, 0], ways[:, 0, 1] = fixed + np.log1p(-begin), change + np.log(begin)

@@ -18,6 +18,7 @@ from strapdown.dsp.chi_square import chi_square_exceeded, plane_bound
 from strapdown.dsp.samples import true_runs
 from strapdown.errors import Finding
 from strapdown.estimation.robust import AdaptiveScale
+from strapdown.navigation.blame import REFUTING
 from strapdown.navigation.consistency import (
     ObservationConsistency,
     consistency_of,
@@ -412,6 +413,7 @@ def trust(evaluation: NavigationEvaluation) -> Trust:
         reasons.append(reason(False, "navigation.nothing-observed"))
     wrong = any(one.severity == "warning" for one in known)
     wrong |= any(one.refutes for one in evaluation.agreements)
+    wrong |= any(one.code in REFUTING for one in evaluation.run.findings)
     against = any(one.severity == "warning" for one in reasons)
     verdict = "trusted" if not against else "distrusted" if wrong else "reserve"
     return Trust(verdict, tuple(reasons), _short(evaluation))

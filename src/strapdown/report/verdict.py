@@ -10,6 +10,7 @@ import pandas as pd
 
 from strapdown.constants import TWO_SIDED_95, Array
 from strapdown.dsp.chi_square import plane_bound
+from strapdown.navigation.blame import BLAMES
 from strapdown.navigation.heading_checks import UNSEEN
 from strapdown.navigation.heading_integrity import (
     CHECKS,
@@ -297,19 +298,23 @@ def apart(differences: pd.DataFrame) -> tuple[Array, Array]:
 def terminal_lines(
     evaluation: NavigationEvaluation, *, brief: bool = False
 ) -> list[tuple[str, str]]:
-    """Up to five lines for the terminal, each with its style; brief, without the position."""
+    """Up to five lines for the terminal, each with its style; brief, without the position.
+
+    Brief, what is named as the cause of all inconsistencies takes the place of the first of them.
+    """
     result, trust = evaluation.run, evaluation.run.trust
     last = trust.heading.spans[-1].status if trust.heading.spans else "rejected"
     lines = [(heading_words(trust) if brief else answer(evaluation), STATUS_STYLES[last])]
     if said := worst_words(trust):
         lines.insert(0, (said, STATUS_STYLES["rejected"]))
-    if (first := trust.first) is not None:
+    first, blamed = trust.first, any(one.code in BLAMES for one in result.findings)
+    if first is not None and not (brief and blamed):
         since = "throughout" if first.throughout else f"first at {instant(first.since)}"
         text = f"First inconsistency: {first.name} {_KINDS[first.kind]}, {since}."
         lines.append((text, "yellow"))
         if said := repeated_words(result):
             lines.append((said, ""))
-    elif trust.advice and trust.heading.spans[-1].status != "trusted":
+    elif first is None and trust.advice and trust.heading.spans[-1].status != "trusted":
         lines.append((f"For the heading: {advice_words(trust.advice[-1], trust)}.", ""))
     return lines
 

@@ -30,7 +30,7 @@ from strapdown.config.navigation import (
 )
 from strapdown.constants import Triple
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
-from strapdown.errors import DataError, DivergenceError, Finding, StrapdownError, add_note
+from strapdown.errors import DataError, DivergenceError, Finding, add_note
 from strapdown.estimation.robust import DOUBT
 from strapdown.evaluation.trajectory_differences import (
     DifferenceSummary,
@@ -38,11 +38,15 @@ from strapdown.evaluation.trajectory_differences import (
     trajectory_differences,
 )
 from strapdown.nav_state import NavState
+from strapdown.navigation.blame import blame
 from strapdown.navigation.filter_options import DAMPINGS
 from strapdown.navigation.integrity import (
+    GAIN_EACH,
+    LEAST_GAIN,
     IntegrityReport,
     assess_integrity,
     likelihood_gain,
+    rejected_percent,
 )
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.measurement import Measurement
@@ -56,17 +60,15 @@ from strapdown.navigation.modes import (
     Until,
 )
 from strapdown.navigation.navigator import Navigator, with_aids, with_states
-from strapdown.navigation.pipeline import NavigationPipeline
+from strapdown.navigation.pipeline import NavigationPipeline, with_aid
 from strapdown.navigation.preprocessing import GapPolicy, ImuPreprocessor, ends_of
 from strapdown.navigation.record import (
     NavigationRecord,
     Span,
-    innovation_labels,
     standard_deviations,
 )
-from strapdown.navigation.recorder import IntervalRecorder, Recorder
+from strapdown.navigation.recorder import Recorder
 from strapdown.navigation.recovery import (
-    FLOAT,
     displaced_stretches,
     longest,
     stated_floats,
@@ -108,14 +110,13 @@ LEAST_LOST = 1.0
 BEGUN, ENDED = 0.15, 0.8
 #: Grades of sensors, the best first; one is coarser than a sensor by this factor of its gyro bias.
 GRADES, COARSER = ("tactical-grade", "industrial-grade", "consumer-grade"), 3.0
-#: Gain in the logarithm of the likelihood from which another sensor explains a record: in all, and
-#: for each component. Innovations are correlated: a record has fewer independent ones.
-LEAST_GAIN, GAIN_EACH = 20.0, 0.05
 #: How often a run is repeated at most that is contradicted for longer than receivers are at fault.
 RECOVERIES = 4
 #: An estimated time offset, s, over which a run is repeated with it, and by how many of its
 #: standard deviations it differs from zero.
 CONTINUED, SURELY = 0.05, 3.0
+#: An offset, s, by which two explanations of a record differ at least.
+SETTLED = 0.01
 #: How often at most: by a second, states of sensors take a part of it, and each run finds some of
 #: the rest, of which the part found is taken to be at least the second.
 STEPS_OF_OFFSET, LEAST_PART = 10, 0.25
@@ -201,11 +202,13 @@ def run_navigation(
         return drive(other, used.imu, used.tables, recorder, show_mode)
 
     progress("aligning" if spec.start is None else "navigating", BEGUN)
+    asked = chain
     with said_of_file(*tables):
         run = again(chain)
         chain, run, by_offset = _with_settled_offsets(chain, run, again)
         chain, run, source, by_jumps = _with_jumps(chain, run, source, again)
         if by_jumps:
+            asked = _with_jumps_of(chain, asked)
             chain, run, more = _with_settled_offsets(chain, run, again)
             by_offset += more
         begun_with = chain
@@ -218,6 +221,7 @@ def run_navigation(
             begun_with, navigator=replace(begun_with.navigator, wrong=chain.navigator.wrong)
         )
         far = starts_far(run.record, sensors)
+        forward = run.record
         # Of one linearization: further passes are about the smoothed states, the filter is not.
         agreement = None if far else _agreement(run, spec)
         if run.smoothed is not None or (far and chain.navigator.damping.feeds_back):
@@ -289,14 +293,26 @@ def run_navigation(
         spec.trust.repeat,
         after,
     )
-    by_grade: tuple[Finding, ...] = ()
+    blamed: tuple[Finding, ...] = ()
     if trust.inconsistencies and spec.trust.repeat:
+        coarser = _coarser(spec, sensors, float(source.imu.index[0]))
         with said_of_file(*tables):
-            by_grade = _explained_by_grade(spec, sensors, source, run.record, after)
+            blamed = blame(
+                asked,
+                chain,
+                coarser,
+                spec.sensors.sensor,
+                source.imu,
+                source.tables,
+                forward,
+                after,
+            )
+        by_offset = _not_of_clock(by_offset, blamed)
     tidy()
     aligned = {one.mode: one for one in run.aligned}
     coarse, fine = aligned.get("coarse"), aligned.get("fine")
     findings = [
+        *blamed,
         *source.findings,
         *channels,
         *looked,
@@ -304,7 +320,6 @@ def run_navigation(
         *(() if fine is None or fine.fine is None else fine.fine.findings),
         *_lost_start(chain, source.imu, best.trajectory),
         *_unsettled(run),
-        *by_grade,
         *in_file((*by_offset, *by_jumps, *by_recovery), *tables),
     ]
     return NavigationRun(
@@ -517,7 +532,11 @@ def _with_jumps(
         for _ in range(2):  # beside the repeated run, what jumps is clearer
             for other, table, finding in list(_jumping(run.record, source.tables[aid.name], aid)):
                 tables = {**source.tables, aid.name: table}
-                tried = _with_aid(chain, other), replace(source, tables=tables)
+                tried = with_aid(chain, other), replace(source, tables=tables)
+                if best is not None and (
+                    other in best[0].navigator.aids and table.equals(best[1].tables[aid.name])
+                ):
+                    continue  # as before
                 try:
                     again = drive(*tried)
                 except DivergenceError:
@@ -533,6 +552,15 @@ def _with_jumps(
     return chain, run, source, ()
 
 
+def _with_jumps_of(chain: NavigationPipeline, other: NavigationPipeline) -> NavigationPipeline:
+    """Return another pipeline whose receivers know of jumps what those of a pipeline do."""
+    for aid, own in zip(chain.navigator.aids, other.navigator.aids, strict=True):
+        if isinstance(aid, Gnss) and isinstance(own, Gnss):
+            own = replace(own, float_position_sd=aid.float_position_sd, displaced=aid.displaced)
+            other = with_aid(other, own)
+    return other
+
+
 def _jumping(
     record: NavigationRecord, table: pd.DataFrame, aid: Gnss
 ) -> Iterator[tuple[Gnss, pd.DataFrame, Finding]]:
@@ -540,7 +568,8 @@ def _jumping(
     file = source_of(table)
     stated = stated_floats(record, table, aid)
     if stated is not None:
-        floats = index_of(table)[(stated[0]["quality"] == FLOAT).to_numpy()]
+        changed = values_of(stated[0], POSITION_SD) > values_of(table, POSITION_SD)
+        floats = index_of(table)[changed.any(axis=1)]
         finding = Finding(
             "navigation.run-again-with-floats",
             file=file,
@@ -562,12 +591,6 @@ def _jumping(
             given=str([[round(x, 3) for x in one] for one in found]),
         )
         yield replace(aid, displaced=found), table, finding
-
-
-def _with_aid(chain: NavigationPipeline, aid: Measurement) -> NavigationPipeline:
-    """Return a pipeline with other options of the aid of this name, and the states they state."""
-    aids = tuple(aid if one.name == aid.name else one for one in chain.navigator.aids)
-    return replace(chain, navigator=with_aids(chain.navigator, aids))
 
 
 def _recovered(
@@ -605,8 +628,8 @@ def _recovered(
                 count=len(wrong),
                 begin=min(one.begin for one in wrong),
                 end=max(one.end for one in wrong),
-                rejected=_rejected(first),
-                left=_rejected(run.record),
+                rejected=rejected_percent(first),
+                left=rejected_percent(run.record),
             ),
         )
     return chain, run, findings
@@ -673,69 +696,40 @@ def _unlike_named(
     return unlike_sensor(source.imu, quiet_at_start(source.imu, fixes), named, sensors, site)
 
 
-def _explained_by_grade(
-    spec: NavigationSpec,
-    sensors: ImuUncertainty,
-    source: NavigationSource,
-    record: NavigationRecord,
-    progress: Progress,
-) -> tuple[Finding, ...]:
-    """Run again with the next coarser grade of sensors; report it where it explains more.
-
-    A unit that is far worse than the one that is named rejects good fixes.
-    """
+def _coarser(
+    spec: NavigationSpec, sensors: ImuUncertainty, begin: float
+) -> list[tuple[str, NavigationPipeline]]:
+    """Pipelines with coarser grades of sensors than the one that is named, the best first."""
     named = spec.sensors.sensor
+    if named is None or named in GRADES:
+        return []
     bias = max(sensors.gyro.axis("bias"))
-    coarser = [
-        grade
-        for grade in GRADES
-        if max(ImuUncertainty.of_sensor(load_sensor(grade)).gyro.axis("bias")) > COARSER * bias
-    ]
-    if named is None or named in GRADES or not coarser:
-        return ()
-    other = spec.model_copy(
-        update={"sensors": spec.sensors.model_copy(update={"sensor": coarser[0], "states": None})}
-    )
-    chain = make_chain(other, sensors_of(other))
-    chain = replace(chain, navigator=replace(chain.navigator, smoother=None))
-    stage = f"again, with sensors of {coarser[0]}"
-    try:
-        repeated = run_batch(
-            chain,
-            source.imu,
-            source.tables,
-            IntervalRecorder(rate_hz=1.0),
-            lambda _, share: progress(stage, share),
-            chunk=60.0,
-        ).record
-    except StrapdownError:
-        return ()
-    gain, count = likelihood_gain(record.innovations, repeated.innovations)
-    if gain < max(LEAST_GAIN, GAIN_EACH * count):
-        return ()
-    return (
-        Finding(
-            "navigation.sensor-contradicted",
-            file=source_of(source.imu),
-            quantity="sensors",
-            named=named,
-            grade=coarser[0],
-            gain=gain,
-            count=count,
-            rejected=_rejected(record),
-            left=_rejected(repeated),
-        ),
-    )
+    out = []
+    for grade in GRADES:
+        if max(ImuUncertainty.of_sensor(load_sensor(grade)).gyro.axis("bias")) > COARSER * bias:
+            update = {"sensor": grade, "states": None}
+            table = spec.sensors.model_copy(update=update)
+            other = spec.model_copy(update={"sensors": table})
+            out.append((grade, _switched_on(make_chain(other, sensors_of(other)), begin)))
+    return out
 
 
-def _rejected(record: NavigationRecord) -> float:
-    """Share of the components of all measurements that were rejected, percent."""
-    weights = [
-        values_of(table, [f"weight {label}" for label in innovation_labels(table)])
-        for table in record.innovations.values()
-    ]
-    flat = np.concatenate([np.empty(0), *(one.ravel() for one in weights)])
-    return 100.0 * float(np.mean(flat <= 0.0)) if len(flat) else 0.0
+def _not_of_clock(
+    by_offset: tuple[Finding, ...], blamed: tuple[Finding, ...]
+) -> tuple[Finding, ...]:
+    """Return what was found of clocks, as no fact where another explanation finds another."""
+    for best in blamed:
+        if best.code.startswith("navigation.blame-clock"):
+            continue
+        found, sd = (best.data.get(key, math.nan) for key in ("offset", "offset_sd"))
+        by_offset = tuple(
+            Finding("navigation.offset-not-of-clock", quantity=one.quantity, data=more)
+            if abs((more := {**one.data, "found": found, "sd": sd}).get("offset", math.nan) - found)
+            > max(SETTLED, SURELY * sd)
+            else one
+            for one in by_offset
+        )
+    return by_offset
 
 
 def _with_correction(chain: NavigationPipeline, kind: str) -> NavigationPipeline:

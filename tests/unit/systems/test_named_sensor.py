@@ -63,7 +63,7 @@ def test_a_phone_that_is_named_a_tactical_unit_is_contradicted():
     found = [f for f in drive("stim300", "mpu-6050").findings if f.code == CODE]
     assert len(found) == 1
     data = found[0].data
-    assert (data["named"], data["grade"]) == ("stim300", "industrial-grade")
+    assert (data["named"], data["grade"]) == ("stim300", "consumer-grade")
     assert data["gain"] > 20.0
     assert data["left"] <= data["rejected"]
 
