@@ -421,8 +421,10 @@ def _with_settled_offsets(
 ) -> tuple[NavigationPipeline, PipelineRun, tuple[Finding, ...]]:
     """Repeat a run with the time offsets that it estimates until these are small.
 
-    One with which there is no run, as no fix is left within the alignment, is not known.
+    One that leads to where there is no run, as no fix is left within the alignment, is not known:
+    the first run stays.
     """
+    asked = chain, run
     findings: tuple[Finding, ...] = ()
     before: dict[str, tuple[float, float]] = {}
     for step in range(STEPS_OF_OFFSET + 1):
@@ -432,6 +434,7 @@ def _with_settled_offsets(
         try:
             run = drive(other)
         except (DataError, DivergenceError):
+            (chain, run), findings = asked, ()
             break
         chain, findings = other, left
     code = "navigation.offset-not-settled"
