@@ -212,6 +212,8 @@ class GnssCourse(CoarseAlignment):
 SIGN = np.where(OF_SENSORS.start > HANDED, 1.0, -1.0)
 # Prior standard deviations of an unknown velocity, m/s, and of an unknown attitude, rad.
 UNKNOWN = (100.0, 3.0)
+# And of a vertical velocity of a moving body that no fix measures, m/s.
+CLIMB = 1.0
 # Rows of the biases in all covariances.
 BIASES = np.arange(GYRO_BIAS.start, ACCEL_BIAS.stop)
 # Prior standard deviation of the position at the end, m, against that by the newest fixes.
@@ -555,6 +557,8 @@ class CourseFit:
         rate, force = inputs[:3], inputs[3:]
         sd = np.zeros(self.unknowns)
         sd[END_VELOCITY], sd[TURN] = UNKNOWN
+        if not (self.by_places or np.isfinite(self.fixes.sd[:, 2]).any()):
+            sd[END_VELOCITY.start + 2] = CLIMB
         sd[COUNT:] = UNKNOWN_PLACE
         still = self.sensors.gyro_bias_variance()
         still = still + np.square(gyro.axis("g_sensitivity")) * float(force @ force)

@@ -39,9 +39,9 @@ NOWHERE, STATED_HEIGHT_SD = "nowhere", 100.0
 #: Usual standard deviation of a horizontal position, a component, m, by the quality of NMEA 0183
 #: GGA. Mapit GIS (RTK and Fix Types) has 0.01 to 0.03 m for 4, 0.1 to 0.3 for 5, below 0.3 for 3,
 #: 0.5 to 2 for 2, 2 to 5 for 1; nmea_navsat_driver of ROS takes 0.02 m for 4, 4 for 5 and 1. Float
-#: and precise solutions converge, hence more than the first. A position that the receiver
-#: estimates (6) is no better than an autonomous one; a manual or simulated one (7, 8) says nothing.
-USUAL_POSITION_SD = {4: 0.02, 5: 0.5, 3: 1.0, 2: 1.0, 1: 5.0, 6: 5.0}
+#: and precise solutions converge, hence more than the first. One that is estimated, manual or
+#: simulated (6 to 8) is taken for no better than an autonomous one.
+USUAL_POSITION_SD = {4: 0.02, 5: 0.5, 3: 1.0, 2: 1.0, 1: 5.0, 6: 5.0, 7: 5.0, 8: 5.0}
 #: Typical accuracies of receivers, m and m/s.
 POSITION_SDS = "0.02 suits RTK, 1 a code receiver with corrections, 5 one without"
 VELOCITY_SDS = "0.05 suits RTK, 0.3 a code receiver by Doppler, 1 one that differences places"

@@ -416,7 +416,7 @@ def _of_grade(
 
 def _named(ranked: list[Tested], bench: _Bench, aid: Gnss | None) -> Finding:
     """Finding of the best hypothesis, with what it found and how the others do."""
-    best = ranked[0]
+    best, ranked = ranked[0], [ranked[0], *sorted(ranked[1:], key=lambda x: -x.gain)]
     one, record = best.hypothesis, best.record
     data: dict[str, Any] = {
         **one.data,

@@ -15,7 +15,7 @@ from strapdown import rotation
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.fine import FineResult
-from strapdown.alignment.gnss_course import GnssCourse
+from strapdown.alignment.gnss_course import CLIMB, GnssCourse
 from strapdown.alignment.levelling import BLOCKS, turn_variance
 from strapdown.alignment.mean_errors import block_means, excursion
 from strapdown.constants import MAD_TO_SD
@@ -680,9 +680,8 @@ LOOKED_AT, LOOKED_BACK, LEAST_LOOKED_AT = 9, 10.0, 4
 CLEAR = 5.0
 # And those of a body that the sensors do not show at rest, by this finding of its levelling.
 DOUBTFUL, SHAKEN = 1.0, "alignment.specific-force-scatters"
-# Speed of a body that is not at rest, m/s; vertical one of a moving body, unmeasured, m/s; number
-# of velocities whose median shows it.
-MOVES, CLIMB, NEWEST = 0.5, 1.0, 3
+# Speed of a body that is not at rest, m/s; number of velocities whose median shows it.
+MOVES, NEWEST = 0.5, 3
 #: Standard deviation of a velocity of which nothing is known, m/s.
 UNKNOWN_VELOCITY = 10.0
 

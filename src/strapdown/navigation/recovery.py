@@ -244,6 +244,10 @@ def stated_floats(
         floats, sd = _floats(square, np.diff(at), usual)
         if not 0.0 < floats.mean() <= MOST or (sd < LARGER * np.median(stated, axis=0)).any():
             return None
+        # Some may be stated, with nothing that says from which size they are.
+        floats &= (sd > UNDERSTATED * aid.position_sd_factor * own).any(axis=1)
+        if not floats.any():
+            return None
         larger = np.maximum(own[floats], sd / aid.position_sd_factor)
         limit = math.sqrt(float(np.median(level)) * math.hypot(*larger[0, :2] / math.sqrt(2.0)))
     out = table.copy()

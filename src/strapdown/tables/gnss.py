@@ -40,7 +40,8 @@ GNSS = [*GEODETIC, *VELOCITY, *POSITION_SD, *VELOCITY_SD, "quality"]
 QUALITIES = range(9)
 #: Kinds of fix by this quality, from the best.
 FIX_KINDS = {
-    4: "fixed", 5: "float", 3: "precise", 2: "differential", 1: "autonomous", 6: "estimated"
+    4: "fixed", 5: "float", 3: "precise", 2: "differential", 1: "autonomous", 6: "estimated",
+    7: "manual", 8: "simulated",
 }  # fmt: skip
 # A step between fixes defines a velocity where it exceeds the position uncertainty by this factor
 # and is faster than a standing receiver wanders.

@@ -190,7 +190,8 @@ def test_what_is_wrong_is_named(fault):
     found, _, record = answered(fault, 1)
     assert short(found) == EXPECTED[fault]
     data = found[0].data
-    assert list(data["gains"]) == sorted(data["gains"], reverse=True)
+    # One that leaves most of the misfit may gain more than the best.
+    assert list(data["gains"][1:]) == sorted(data["gains"][1:], reverse=True)
     assert data["gain"] == data["gains"][0] > 100.0
     # The first of the positions that drift away are within their noise yet.
     assert data["scatter_left"] < (1.5 if fault == "stretch" else 1.2) < data["scatter"]
