@@ -190,7 +190,7 @@ def read_heading(path: Path) -> RawLog:
         known = found.setdefault(kind, [])
         if not (timed and 0.0 <= heading <= 360.0 and _of_antennas(kind, fields)):
             without[kind] = without.get(kind, 0) + 1
-        elif not known or known[-1][0] != len(epochs) - 1:
+        else:
             known.append((len(epochs) - 1, row, heading, sd))
     damaged = [row for row, line in wrong.items() if _OF_HEADING.match(line)]
     spoiled = {"file": path.name, "quantity": "heading", "count": len(damaged)}
@@ -209,9 +209,9 @@ def read_heading(path: Path) -> RawLog:
         add_note(findings, "io.heading-without-time", file=path.name, quantity="time", kind=chosen)
     times, clock = _times(epochs)
     at, rows, heading_deg, sd_deg = (np.array(part) for part in zip(*found[chosen], strict=True))
-    _, order = np.unique(times[at], return_index=True)  # in time, each instant once
+    _, order = np.unique(times[at], return_index=True)  # in time, the first of each instant
     out = {"time": (times[at[order]], "s"), "heading": (heading_deg[order], "deg")}
-    if (sd_deg > 0.0).all():
+    if (sd_deg[order] > 0.0).all():
         out["heading_sd"] = (sd_deg[order], "deg")
     return RawLog.of(path, out, clock=clock.name, rows=rows[order], findings=findings)
 

@@ -166,6 +166,11 @@ def test_an_instant_of_two_talkers_has_one_heading_and_none_is_left_out(tmp_path
     raw = open_stream(written(tmp_path, lines), "heading")
     assert raw.columns["heading"].tolist() == [10.0, 11.0]
     assert codes(raw) == ["io.heading-without-time"]
+    # A heading that is not kept has no part in whether all have a standard deviation.
+    lines = [pashr("100000.00", 1.0, 0.2), pashr("100000.00", 2.0, 0.0), pashr("100001.00", 3.0)]
+    raw = open_stream(written(tmp_path, [gga("100000.00"), *lines]), "heading")
+    assert raw.columns["heading"].tolist() == [1.0, 3.0]
+    assert raw.columns["heading_sd"].tolist() == [0.2, 0.1]
 
 
 def test_damaged_sentences_of_headings_are_counted(tmp_path):
