@@ -5,7 +5,7 @@ geoid and the geoid undulation; RMC and ZDA the date; GST the standard deviation
 longitude and height; RMC or VTG speed and true course over ground, for the velocity north and east.
 The vertical velocity is not stated.
 
-Headings, deg from true north, of the first of these kinds that a file has:
+Headings, deg from true north, of the first of these kinds with one that can be used:
 
 - ``$PASHR,time,heading,T,roll,pitch,heave,sd of roll,sd of pitch,sd of heading,quality,alignment``
   (Trimble, help.fieldsystems.trimble.com/sps/nmea0183-messages-pashr.htm; Hemisphere without the
@@ -52,9 +52,12 @@ _SENTENCE = re.compile(
     r"\$([A-Z]{2}|PSAT,)([A-Z]{3}),([^*]*)\*([0-9A-Fa-f]{2})(?:[,;\s][\d\s.,:-]*)?$"
 )
 TITLE = "NMEA 0183: GGA, RMC, VTG, ZDA, GST; HDT, THS, PASHR, PSAT,HPR"
-#: Kinds of sentences with a heading, the first that is there counts, and fields that they have.
+#: Kinds of sentences with a heading, the first with one of use counts, and fields that they have.
 HEADINGS = {"SHR": 3, "HPR": 5, "THS": 2, "HDT": 1}
+_OF_HEADING = re.compile(rf"\$(?:[A-Z]{{2}}|PSAT,)(?:{'|'.join(HEADINGS)}),")
 _DAY = 86400.0
+#: Longest time that a sentence comes after one of a later instant, s.
+_LATE = 60.0
 _KNOT = SPEEDS["kn"]
 _NAN3 = (np.nan, np.nan, np.nan)
 
@@ -95,7 +98,7 @@ def read(path: Path) -> Fixes:
     a wrong checksum are dropped and counted.
     """
     epochs: list[_Epoch] = []
-    wrong: list[int] = []
+    wrong: dict[int, str] = {}
     sentences, findings = _sentences(path, wrong)
     for row, kind, fields in sentences:
         _take(epochs, kind, fields, row, path.name)
@@ -103,7 +106,8 @@ def read(path: Path) -> Fixes:
     if not fixed:
         raise DataError("io.holds-no-gga-sentence-whole", file=path.name)
     if wrong:
-        add_note(findings, "io.nmea-lines-left-out", file=path.name, row=wrong[0], count=len(wrong))
+        row = next(iter(wrong))
+        add_note(findings, "io.nmea-lines-left-out", file=path.name, row=row, count=len(wrong))
     time, clock = _times(fixed)
     sd = np.array([e.sd for e in fixed])
     placed = [e for e in fixed if np.isfinite(e.place[2])]
@@ -134,9 +138,9 @@ def read(path: Path) -> Fixes:
 
 
 def _sentences(
-    path: Path, wrong: list[int]
+    path: Path, wrong: dict[int, str]
 ) -> tuple[Iterator[tuple[int, str, list[str]]], list[Finding]]:
-    """Return the sentences, each with its row, kind and fields; damaged rows go to `wrong`."""
+    """Return the sentences, each with its row, kind and fields; damaged ones go to `wrong`."""
     text, findings = decoded(path.read_bytes(), path.name)
 
     def whole() -> Iterator[tuple[int, str, list[str]]]:
@@ -146,7 +150,7 @@ def _sentences(
                 continue
             match = _SENTENCE.match(line[start:])
             if match is None or not _whole(match):
-                wrong.append(row)
+                wrong[row] = line[start:]
                 continue
             yield row, match[2], match[3].split(",")
 
@@ -157,38 +161,46 @@ def read_heading(path: Path) -> RawLog:
     """Read the headings of two antennas, deg, with standard deviations where all have one.
 
     On the clock of `read`. A heading without a time of its own has that of the sentence before it,
-    the first of several. Those that are marked as not valid, or as not of the antennas, are left
-    out and counted.
+    the first of several: receivers write one instant under two talkers. Those that are marked as
+    not valid, or as not of the antennas, or are not within 0 and 360 deg, are left out and counted,
+    as are those with a wrong checksum.
     """
     epochs: list[_Epoch] = []
     found: dict[str, list[tuple[int, int, float, float]]] = {}
     without: dict[str, int] = {}
-    sentences, findings = _sentences(path, [])
+    wrong: dict[int, str] = {}
+    sentences, findings = _sentences(path, wrong)
     for row, kind, fields in sentences:
         if kind not in HEADINGS:
             _take(epochs, kind, fields, row, path.name)
             continue
         if len(fields) < HEADINGS[kind] or (kind == "SHR" and fields[2] != "T"):
             continue  # a sentence of Ashtech under the same name has letters
+        timed = bool(epochs)
         if kind in ("SHR", "HPR"):
             time = _number(fields, 0, kind, "time", row, path.name)
-            time = _time_of_day(time) if np.isfinite(time) else np.nan
-            if not epochs or epochs[-1].time != time:
+            timed = bool(np.isfinite(time))
+            time = _time_of_day(time) if timed else np.nan
+            if timed and (not epochs or epochs[-1].time != time):
                 epochs.append(_Epoch(row, time))
         heading = _number(fields, int(kind in ("SHR", "HPR")), kind, "heading", row, path.name)
         sd = np.nan
         if kind == "SHR" and len(fields) > 8:
             sd = _number(fields, 8, kind, "standard deviation", row, path.name)
         known = found.setdefault(kind, [])
-        first = not known or known[-1][0] != len(epochs) - 1
-        timed = bool(epochs) and np.isfinite(epochs[-1].time)
-        if not (timed and first and np.isfinite(heading) and _of_antennas(kind, fields)):
+        if not (timed and 0.0 <= heading <= 360.0 and _of_antennas(kind, fields)):
             without[kind] = without.get(kind, 0) + 1
-            continue
-        known.append((len(epochs) - 1, row, heading, sd))
-    chosen = next((kind for kind in HEADINGS if kind in found), None)
+        else:
+            known.append((len(epochs) - 1, row, heading, sd))
+    damaged = [row for row, line in wrong.items() if _OF_HEADING.match(line)]
+    spoiled = {"file": path.name, "quantity": "heading", "count": len(damaged)}
+    if damaged and not found:
+        raise DataError("io.holds-no-heading-whole", row=damaged[0], **spoiled)
+    chosen = min(found, key=lambda kind: (not found[kind], [*HEADINGS].index(kind)), default=None)
     if chosen is None:
         raise NoStreamError(path.name, "heading", TITLE, ["gnss"])
+    if damaged:
+        add_note(findings, "io.nmea-lines-left-out", row=damaged[0], **spoiled)
     if count := without.get(chosen, 0):
         add_note(findings, "io.headings-left-out", file=path.name, quantity="heading", count=count)
     if not found[chosen]:
@@ -197,9 +209,9 @@ def read_heading(path: Path) -> RawLog:
         add_note(findings, "io.heading-without-time", file=path.name, quantity="time", kind=chosen)
     times, clock = _times(epochs)
     at, rows, heading_deg, sd_deg = (np.array(part) for part in zip(*found[chosen], strict=True))
-    _, order = np.unique(times[at], return_index=True)  # in time, each instant once
+    _, order = np.unique(times[at], return_index=True)  # in time, the first of each instant
     out = {"time": (times[at[order]], "s"), "heading": (heading_deg[order], "deg")}
-    if (sd_deg > 0.0).all():
+    if (sd_deg[order] > 0.0).all():
         out["heading_sd"] = (sd_deg[order], "deg")
     return RawLog.of(path, out, clock=clock.name, rows=rows[order], findings=findings)
 
@@ -310,7 +322,9 @@ def _day(year: int, month: int, day: int) -> float | None:
 def _times(fixed: list[_Epoch]) -> tuple[np.ndarray, Clock]:
     """Return seconds since 1970 if a date is stated, unwrapped at midnight, and the clock."""
     time = np.array([e.time for e in fixed])
-    days = np.cumsum(np.concatenate([[0.0], np.diff(time) < -0.5 * _DAY]))
+    step = np.diff(time, prepend=time[:1])
+    # A late sentence goes back over midnight. A longer step forward is a pause within the day.
+    days = np.cumsum(1.0 * (step < -0.5 * _DAY) - 1.0 * (step > _DAY - _LATE))
     dated = next((k for k, e in enumerate(fixed) if e.day is not None), None)
     if dated is None:
         return time + _DAY * days, Clock(RELATIVE)

@@ -63,9 +63,9 @@ def test_headings_of_sentences_without_a_time_have_that_before_them(tmp_path):
     assert raw.columns["time"].tolist() == [AT, AT + 1.0, AT + 4.0]
     assert raw.columns["heading"].tolist() == [179.0284, 180.5, 359.9]
     assert (raw.clock, "heading_sd" in raw.columns) == ("unix", False)
-    # One before any time, one of two of an instant, dead reckoning, not valid, and a simulator.
+    # One before any time, dead reckoning, not valid, and a simulator; not one of two of an instant.
     assert codes(raw) == ["io.headings-left-out", "io.heading-without-time"]
-    assert raw.findings[0].data["count"] == 5
+    assert raw.findings[0].data["count"] == 4
     assert raw.rows.tolist() == [3, 6, 13]
     assert len(read_gnss(path, GnssOptions(position_sd=1.0))) == 6
 
@@ -98,11 +98,12 @@ def test_headings_of_hemisphere_have_a_time_of_their_own(tmp_path):
     assert "io.nmea-lines-left-out" not in [f.code for f in found]
 
 
-def test_attitude_sentences_have_a_standard_deviation(tmp_path):
-    def pashr(clock, heading, sd_deg, quality, aligned=",0"):
-        values = f"{heading},T,1.0,2.0,,0.1,0.1,{sd_deg},{quality}{aligned}"
-        return sentence(f"PASHR,{clock},{values}")
+def pashr(clock, heading, sd_deg=0.1, quality=2, aligned=",0"):
+    values = f"{heading},T,1.0,2.0,,0.1,0.1,{sd_deg},{quality}{aligned}"
+    return sentence(f"PASHR,{clock},{values}")
 
+
+def test_attitude_sentences_have_a_standard_deviation(tmp_path):
     lines = [
         *(gga("100001.00"), RMC, pashr("100001.00", 350.25, 0.3, 2), sentence("GNTHS,1.0,A")),
         *(pashr("100001.50", 351.0, 0.4, 1), pashr("100002.00", 352.0, 0.3, 0)),
@@ -127,6 +128,79 @@ def test_a_file_without_a_heading_or_without_a_valid_one(tmp_path):
         open_stream(written(tmp_path, [gga("100000.00"), "$HETHS,316.70,E*1A"]), "heading")
     with pytest.raises(DataError, check=coded("io.not-number")):
         open_stream(written(tmp_path, [gga("100000.00"), sentence("GPHDT,x,T")]), "heading")
+
+
+def test_headings_that_come_after_the_next_fix_over_midnight(tmp_path):
+    lines = [
+        *(gga("235958.00"), sentence("GNRMC,235958.00,A,4730.0,N,00830.0,E,0.0,0.0,010524,,,A")),
+        *(gga("235959.00"), pashr("235958.00", 1.0), gga("000000.00"), pashr("235959.00", 2.0)),
+        *(gga("000001.00"), pashr("000000.00", 3.0), gga("000002.00"), pashr("000001.00", 4.0)),
+    ]
+    raw = open_stream(written(tmp_path, lines), "heading")
+    since = raw.columns["time"] - (DAY + 86_400.0)
+    assert since.tolist() == [-2.0, -1.0, 0.0, 1.0]
+    assert raw.columns["heading"].tolist() == [1.0, 2.0, 3.0, 4.0]
+
+
+def test_a_pause_of_more_than_half_a_day_is_within_the_day(tmp_path):
+    lines = [sentence("GNRMC,060000.00,A,4730.0,N,00830.0,E,0.0,0.0,010524,,,A")]
+    lines += [pashr("060000.00", 1.0), pashr("200000.00", 2.0), pashr("010000.00", 3.0)]
+    raw = open_stream(written(tmp_path, lines), "heading")
+    hours = (raw.columns["time"] - DAY) / 3600.0
+    assert hours.tolist() == [6.0, 20.0, 25.0]
+
+
+def test_a_kind_without_a_usable_heading_does_not_hide_another(tmp_path):
+    empty = sentence("PASHR,,,T,,,,,,,0,0")
+    lines = [gga("100000.00"), empty, sentence("GPHDT,10.0,T"), gga("100001.00"), RMC]
+    lines += [pashr("100001.00", "", quality=0), sentence("GPHDT,11.0,T")]
+    raw = open_stream(written(tmp_path, lines), "heading")
+    assert raw.columns["time"].tolist() == [AT, AT + 1.0]
+    assert raw.columns["heading"].tolist() == [10.0, 11.0]
+    assert codes(raw) == ["io.heading-without-time"]
+
+
+def test_an_instant_of_two_talkers_has_one_heading_and_none_is_left_out(tmp_path):
+    lines = [gga("100000.00"), sentence("GPHDT,10.0,T"), sentence("GNHDT,10.5,T")]
+    lines += [gga("100001.00"), RMC, sentence("GPHDT,11.0,T"), sentence("GNHDT,11.5,T")]
+    raw = open_stream(written(tmp_path, lines), "heading")
+    assert raw.columns["heading"].tolist() == [10.0, 11.0]
+    assert codes(raw) == ["io.heading-without-time"]
+    # A heading that is not kept has no part in whether all have a standard deviation.
+    lines = [pashr("100000.00", 1.0, 0.2), pashr("100000.00", 2.0, 0.0), pashr("100001.00", 3.0)]
+    raw = open_stream(written(tmp_path, [gga("100000.00"), *lines]), "heading")
+    assert raw.columns["heading"].tolist() == [1.0, 3.0]
+    assert raw.columns["heading_sd"].tolist() == [0.2, 0.1]
+
+
+def test_damaged_sentences_of_headings_are_counted(tmp_path):
+    bad = [sentence("GPHDT,10.0,T").replace("10.0", "20.0"), "$PSAT,HPR,235410.50,89.58,3.3"]
+    fixes = [gga("100000.00"), gga("100001.00"), RMC]
+    spoiled = fixes[0].replace("500.0", "600.0")
+    lines = [fixes[0], spoiled, *bad, *fixes[1:], sentence("GPHDT,11.0,T")]
+    path = written(tmp_path, lines)
+    raw = open_stream(path, "heading")
+    assert raw.columns["heading"].tolist() == [11.0]
+    assert codes(raw) == ["io.nmea-lines-left-out", "io.heading-without-time"]
+    left_out = raw.findings[0]
+    assert (left_out.row, left_out.quantity, left_out.data["count"]) == (3, "heading", 2)
+    found = read_gnss(path, GnssOptions(position_sd=1.0)).attrs["findings"]
+    assert (found[0].row, found[0].data["count"]) == (2, 3)
+    with pytest.raises(DataError, check=coded("io.holds-no-heading-whole", count=2)):
+        open_stream(written(tmp_path, [*fixes, *bad]), "heading")
+    # A damaged fix is no heading.
+    with pytest.raises(NoStreamError):
+        open_stream(written(tmp_path, [*fixes, spoiled]), "heading")
+
+
+def test_headings_beyond_a_turn_are_not_valid(tmp_path):
+    angles = ["999.0", "-10.0", "0.0", "360.0", "360.01", "-0.01"]
+    pairs = [(gga(f"10000{k}.00"), sentence(f"GPHDT,{a},T")) for k, a in enumerate(angles)]
+    lines = [line for pair in pairs for line in pair]
+    raw = open_stream(written(tmp_path, lines), "heading")
+    assert raw.columns["heading"].tolist() == [0.0, 360.0]
+    assert codes(raw) == ["io.headings-left-out", "io.heading-without-time"]
+    assert raw.findings[0].data["count"] == 4
 
 
 # UBX.
