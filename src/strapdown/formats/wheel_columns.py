@@ -127,7 +127,7 @@ def _mean(time: Array, block: list[Array]) -> Array:
         values if own[least].all() else _between(time, time[own], values[own])
         for values, own in zip(block, there, strict=True)
     ]
-    return np.where(least, np.mean(at, axis=0), np.nan)
+    return np.asarray(np.mean(at, axis=0))
 
 
 def _between(time: Array, own: Array, values: Array) -> Array:

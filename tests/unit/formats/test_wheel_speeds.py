@@ -119,6 +119,12 @@ def in_rows(values, rows):
         (range(0, 200, 5), range(3, 200, 10), range(3, 200, 10)),
         # Rows 55 to 145 of the right wheel are missing.
         (range(0, 200, 20), [*range(5, 60, 10), *range(145, 200, 10)], (20, 40, 160, 180)),
+        # Rows 60 and 140, at the ends of a gap, have both.
+        (
+            range(0, 200, 20),
+            [*range(0, 61, 10), *range(140, 200, 10)],
+            (0, 20, 40, 60, 140, 160, 180),
+        ),
         # The right wheel is there in each row of the left one.
         (range(0, 200, 10), range(200), range(0, 200, 10)),
     ],
