@@ -29,6 +29,7 @@ from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.recording import Reading, Recording, StatedStart
 from strapdown.formats.trajectory_readers import read_trajectory
+from strapdown.formats.wheel_columns import EMPTY, UNIT_OPEN
 from strapdown.navigation.measurements.gnss_readiness import without_repeats
 from strapdown.navigation.measurements.magnetometer import Magnetometer
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
@@ -294,6 +295,9 @@ def of_samples(given: AidSpec, imu: pd.DataFrame, recording: Recording) -> pd.Da
     if entry.stream == "wheel" and recording.wheel is not None:
         return _with_sds(given.make(), wheel_table(recording))
     if not set(entry.columns) <= set(imu.columns):
+        of_wheels = (UNIT_OPEN, EMPTY) if entry.stream == "wheel" else ()
+        if reason := next((f for f in recording.findings if f.code in of_wheels), None):
+            raise DataError(reason)
         raise DataError(
             "navigation.no-such-columns-in-log", file=source_of(imu), columns=entry.columns
         )

@@ -44,6 +44,8 @@ def codes(recording):
         ("obd_speed_m_s", 1.0),
         ("CAN Speed [km/h]", 1.0 / 3.6),
         ("vehicleSpeedKmh", 1.0 / 3.6),
+        ("speed_wheel_kmh", 1.0 / 3.6),
+        ("speed vehicle (m/s)", 1.0),
     ],
 )
 def test_a_column_that_says_wheel_or_vehicle_and_a_unit(tmp_path, name, factor):
@@ -86,6 +88,90 @@ def test_of_four_wheels_those_in_the_rear(tmp_path):
     assert recording.wheel.name == "WheelSpeedRL [km/h], rr_wheel_speed_mps"
     front = read_log(log(tmp_path, dict(list(four.items())[:3])))
     np.testing.assert_allclose(front.wheel, SPEED * 8.5 / 3.6, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("left", "right"),
+    [
+        ("wheel_rl_speed_kmh", "speed_rr_wheel_kmh"),
+        ("rear_wheel_left_speed_kmh", "speed right back wheel [km/h]"),
+    ],
+)
+def test_words_of_a_wheel_in_any_order(tmp_path, left, right):
+    recording = read_log(log(tmp_path, {left: 3.6 * SPEED, right: 3.6 * SPEED + 3.6}))
+    assert recording.wheel.name == f"{left}, {right}"
+    np.testing.assert_allclose(recording.wheel, SPEED + 0.5, rtol=1e-14)
+
+
+REAR = ("wheel_speed_rl_mps", "wheel_speed_rr_mps")
+
+
+def in_rows(values, rows):
+    return np.where(np.isin(np.arange(COUNT), rows), values, np.nan)
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "expected"),
+    [
+        # By turns: the first row of the left wheel is before all of the right one.
+        (range(0, 200, 10), range(5, 200, 10), range(10, 200, 10)),
+        (range(0, 200, 20), range(4, 200, 10), range(20, 200, 20)),
+        (range(0, 200, 5), range(3, 200, 10), range(3, 200, 10)),
+        # Rows 55 to 145 of the right wheel are missing.
+        (range(0, 200, 20), [*range(5, 60, 10), *range(145, 200, 10)], (20, 40, 160, 180)),
+        # Rows 60 and 140, at the ends of a gap, have both.
+        (
+            range(0, 200, 20),
+            [*range(0, 61, 10), *range(140, 200, 10)],
+            (0, 20, 40, 60, 140, 160, 180),
+        ),
+        # The right wheel is there in each row of the left one.
+        (range(0, 200, 10), range(200), range(0, 200, 10)),
+    ],
+)
+def test_wheels_in_different_rows(tmp_path, left, right, expected):
+    pair = (in_rows(SPEED, left), in_rows(SPEED + 2.0, right))
+    for columns in (dict(zip(REAR, pair, strict=True)), dict(zip(REAR, pair[::-1], strict=True))):
+        recording = read_log(log(tmp_path, columns))
+        if len(left) != len(right) or columns[REAR[0]] is pair[0]:
+            np.testing.assert_allclose(recording.wheel.index, TIME[list(expected)], atol=1e-12)
+        np.testing.assert_allclose(recording.wheel, 11.0 + recording.wheel.index, rtol=1e-12)
+        assert "io.wheel-speed-mean" in codes(recording)
+
+
+NEVER = np.full(COUNT, np.nan)
+EMPTY = [
+    {"wheel_speed_kmh": NEVER},
+    dict.fromkeys(REAR, NEVER),
+    {REAR[0]: SPEED, REAR[1]: NEVER},
+    # One ends before the other begins.
+    {REAR[0]: in_rows(SPEED, range(80)), REAR[1]: in_rows(SPEED, range(120, 200))},
+]
+
+
+def odometer_of_log():
+    return Kinds("aiding", base=AidSpec)({"kind": "odometer", "speed_sd_m_per_s": 1.0})
+
+
+@pytest.mark.parametrize("columns", EMPTY)
+def test_wheels_without_a_value(tmp_path, columns):
+    path = log(tmp_path, columns)
+    recording = read_log(path)
+    assert recording.wheel is None
+    (found,) = (f for f in recording.findings if f.code == "io.no-usable-row")
+    assert (found.severity, found.quantity) == ("warning", ", ".join(columns))
+    assert not {"io.wheel-speed-of", "io.wheel-speed-mean"} & set(codes(recording))
+    (shown,) = sd.doctor(path).data["logs"]
+    assert [s["name"] for s in shown["streams"]] == ["imu"]
+    with pytest.raises(DataError, check=coded("io.no-usable-row")):
+        of_samples(odometer_of_log(), recording.imu, recording)
+
+
+def test_why_a_column_without_a_unit_is_not_used(tmp_path):
+    recording = read_log(log(tmp_path, {"wheel_speed": SPEED}))
+    with pytest.raises(DataError, check=coded("io.wheel-speed-unit-open")) as caught:
+        of_samples(odometer_of_log(), recording.imu, recording)
+    assert caught.value.finding.data["names"] == ("wheel_speed",)
 
 
 def test_a_value_that_is_repeated_until_the_next_counts_once(tmp_path):
