@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 from tests.coded import coded
+from tests.drives.generator import draw, make
 from tests.town_drive import motion
 
 import strapdown as sd
@@ -174,6 +175,15 @@ def test_a_column_of_fixes_behind_a_minus():
 # One axis in another unit.
 
 MIXED = [(1, 1, DEG), (DEG, 1, 1), (1, DEG, DEG)]
+
+
+def test_turning_about_the_vertical_is_no_other_unit(tmp_path):
+    """A car in a town: the force beside its vertical axis is acceleration, which does not turn.
+
+    Of this drive a yaw rate as small as in another unit explains 92 % of it, and any one unit 38 %.
+    """
+    made = make(draw(31317), tmp_path)
+    assert "io.gyro-axis-in-other-unit" not in codes(sd.read_imu(made.log))
 
 
 @pytest.mark.parametrize("names", [SI, BARE], ids=["stated", "not stated"])

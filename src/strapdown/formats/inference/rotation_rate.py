@@ -145,7 +145,8 @@ def infer_gyro(
         base[None, "other", tau] = float(np.log(share * _OTHER))
         found = turns(ticks * factor, gyro, force) if force is not None else ()
         if share > 0.5:
-            scale_of_all, odd = scale_by_gravity(found), axis_in_other_unit(found)
+            scale_of_all = scale_by_gravity(found)
+            odd = None if force is None else axis_in_other_unit(found, force)
         for key, (scale, _) in candidates.items():
             beyond = [(turn.beyond_stillness(scale), turn.half_width) for turn in found]
             beyond = sorted((b for b in beyond if b[0] > STILL_TURN), reverse=True)
@@ -545,15 +546,17 @@ def scale_by_gravity(found: Sequence[Turn]) -> Scale | None:
 
 
 #: How much more of the turning of gravity a gyro with one axis in another unit must explain than
-#: any gyro of one unit.
-_MORE = 0.1
+#: any gyro of one unit. An axis on which so much of the force stays is nearly vertical: turning
+#: about it does not turn gravity, and of a vehicle the force beside it is acceleration.
+_MORE, _VERTICAL = 0.1, 0.9
 
 
-def axis_in_other_unit(found: Sequence[Turn]) -> Finding | None:
+def axis_in_other_unit(found: Sequence[Turn], force: Array) -> Finding | None:
     """Find one axis of a gyro in deg/s beside two in rad/s, or the reverse, by turning gravity.
 
-    `found`: sums of time scales, of which two at least have to agree. Returns evidence with the
-    axis, the unit that it has beside the others, and the least share explained; None otherwise.
+    `found`: sums of time scales, of which two at least have to agree. `force` ((n, 3)): of all
+    samples. Returns evidence with the axis, the unit that it has beside the others, and the least
+    share explained; None otherwise.
     """
     kinds = [(k, factor) for k in range(3) for factor in (np.degrees(1.0), np.radians(1.0))]
     m = np.array([np.diag([1.0 / f if j == k else 1.0 for j in range(3)]) for k, f in kinds])
@@ -570,6 +573,8 @@ def axis_in_other_unit(found: Sequence[Turn]) -> Finding | None:
     if len(rows) < LEAST_SCALES or len({best for best, _ in rows}) > 1:
         return None
     k, factor = kinds[rows[0][0]]
+    if abs(force[:, k].mean()) > _VERTICAL * np.sqrt(np.square(force).sum(axis=1).mean()):
+        return None
     units = ("deg/s", "rad/s") if factor > 1.0 else ("rad/s", "deg/s")
     return evidence(
         "io.evidence-axis-in-other-unit",
