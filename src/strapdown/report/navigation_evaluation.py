@@ -18,7 +18,7 @@ from strapdown.dsp.chi_square import chi_square_exceeded, plane_bound
 from strapdown.dsp.samples import true_runs
 from strapdown.errors import Finding
 from strapdown.estimation.robust import AdaptiveScale
-from strapdown.navigation.blame import REFUTING
+from strapdown.navigation.blame import BLAMES, REFUTING
 from strapdown.navigation.consistency import (
     ObservationConsistency,
     consistency_of,
@@ -399,7 +399,9 @@ def trust(evaluation: NavigationEvaluation) -> Trust:
     """Judge a run by its consistency."""
     known = _against_known(evaluation)
     used = [one for one in evaluation.agreements if one.used.any()]
-    reasons = known + [_innovations(one) for one in used]
+    # The cause, where one is found, stands before what it does.
+    warned = [f for f in evaluation.run.findings if f.severity == "warning"]
+    reasons = [f for f in warned if f.code in BLAMES] + known + [_innovations(one) for one in used]
     for one in evaluation.agreements:
         if one.remembers:
             chance = {"correlation": one.correlation, "by_chance": one.correlation_bound}
@@ -408,7 +410,7 @@ def trust(evaluation: NavigationEvaluation) -> Trust:
             )
     reasons += _rejected(evaluation)
     # Notes appear among the findings and do not count against the run.
-    reasons += [f for f in evaluation.run.findings if f.severity == "warning"]
+    reasons += [f for f in warned if f.code not in BLAMES]
     if not used and evaluation.errors is None and not evaluation.run.withheld:
         reasons.append(reason(False, "navigation.nothing-observed"))
     wrong = any(one.severity == "warning" for one in known)

@@ -230,7 +230,10 @@ def test_an_offset_that_the_arm_explains_is_no_fact():
     data = told["offset-not-of-clock"]
     assert data["offset"] < -0.05
     assert abs(data["found"]) < 4.0 * data["sd"] < 0.05
-    assert trust(NavigationEvaluation(run)).verdict == "distrusted"
+    judged = trust(NavigationEvaluation(run))
+    assert judged.verdict == "distrusted"
+    # The cause stands before what it does, and once.
+    assert [k for k, f in enumerate(judged.reasons) if f.code in blaming.BLAMES] == [0]
 
 
 def test_nothing_is_tested_of_a_run_that_is_not_to_be_repeated(monkeypatch):
