@@ -458,7 +458,7 @@ def repeated_rows(table: pd.DataFrame) -> tuple[Flags, float]:
     """Find rows that repeat the position and velocity of an earlier one while the vehicle moves.
 
     Moving is what the repeated velocity states. Without it the position after them shows it: as far
-    off as the speed before and after makes in this time, and beyond the errors of positions. A
+    off as the speed before or after makes in this time, and beyond the errors of positions. A
     vehicle that has stopped is near where it stopped.
 
     Parameters
@@ -496,10 +496,11 @@ def repeated_rows(table: pd.DataFrame) -> tuple[Flags, float]:
             # Over some fixes: from one to the next a walk is hardly more than their scatter.
             c, d = max(0, a - 1 - BESIDE), min(len(values) - 1, b + BESIDE)
             ways = ways_between(place[[c, a - 1, b, d]])
-            speed = min(ways[0] / (time[a - 1] - time[c]), ways[2] / (time[d] - time[b]))
-            way = speed * (time[b] - time[a - 1])
+            speeds = np.array([ways[0] / (time[a - 1] - time[c]), ways[2] / (time[d] - time[b])])
+            way = speeds * (time[b] - time[a - 1])
             blur = 5.0 * float(np.linalg.norm(usual[[a, b]]))
-            moves = min(way, ways[1]) > blur and ways[1] > 0.5 * way and speed > MOVING
+            gone = (way > blur) & (ways[1] > np.maximum(blur, 0.5 * way)) & (speeds > MOVING)
+            moves, speed = bool(gone.any()), float(speeds.max(where=gone, initial=0.0))
         if moves:
             out[a:b] = True
             first = first or speed

@@ -278,11 +278,19 @@ def test_a_frozen_receiver_is_found_by_positions_alone_and_one_that_stands_is_no
     assert without_repeats(remade(town.fixes(), place=place, **alone))[1] == ()
 
 
-@pytest.mark.parametrize("walks", [True, False])
-def test_a_walk_is_less_than_what_a_receiver_may_be_off_and_more_than_its_scatter(walks):
+@pytest.mark.parametrize("walk", ["goes on", "ends in it", "begins in it", "rests meanwhile"])
+def test_a_walk_is_less_than_what_a_receiver_may_be_off_and_more_than_its_scatter(walk):
     """18 equal fixes of a phone, whose errors of metres last: 1.3 m/s, or at rest."""
-    time = np.arange(120.0)
-    way = 1.3 * (time if walks else np.where(time < 60.0, time, np.maximum(60.0, time - 18.0)))
+    time, walks = np.arange(120.0), walk != "rests meanwhile"
+    way = (
+        1.3
+        * {
+            "goes on": time,
+            "ends in it": np.minimum(time, 77.0),
+            "begins in it": np.maximum(time, 61.0),
+            "rests meanwhile": np.where(time < 60.0, time, np.maximum(60.0, time - 18.0)),
+        }[walk]
+    )
     random = np.random.default_rng(11)
     off = 0.3 * random.standard_normal((len(time), 3)) + [2.0, -1.0, 1.0]
     off[:, 0] += way
