@@ -550,7 +550,7 @@ def _with_jumps(
             if best is None:
                 break
         if best is not None:  # a record may have both, each once
-            chain, run, source, more = _with_jumps(*best[:1], run, best[1], drive)
+            chain, run, source, more = _with_jumps(best[0], run, best[1], drive)
             return chain, run, source, (best[2], *more)
     return chain, run, source, ()
 
