@@ -35,7 +35,7 @@ ARM, CLOCK = 3.0, 1.0
 FAULT = 30.0
 #: Factors on the standard deviations of all fixes of a receiver.
 NOISIER = (1.5, 10.0)
-#: An offset, s, over which the fixes are compared again with the motion at their instants, and by
+#: A time offset, s, over which a run is repeated about it, to compare fixes and motion anew; and by
 #: how many standard deviations a clock has stepped.
 CONTINUED, STEPPED = 0.05, 5.0
 #: A longer record is tested by its part around the worst stretch, s; of which so much is before it.

@@ -170,7 +170,7 @@ def displaced_stretches(
         Largest of their displacements.
     """
     rows, at, steps, stated = _steps(record, table, aid)
-    if len(rows) < 4 * BESIDE:
+    if not len(rows):
         return (), 0.0
     scatter = MAD_TO_SD * np.median(np.abs(steps), axis=0)
     allowed = np.maximum(JUMPED * scatter, STATED * stated)
@@ -222,7 +222,7 @@ def stated_floats(
         With the `float_position_sd` that separates them. None where there are none, or as stated.
     """
     rows, at, steps, stated = _steps(record, table, aid)
-    if len(rows) < 4 * BESIDE:
+    if not len(rows):
         return None
     usual = np.maximum(MAD_TO_SD * np.median(np.abs(steps), axis=0), TINY)
     square = np.square(steps / usual).sum(axis=1)
@@ -327,7 +327,7 @@ def _steps(
     Returns
     -------
     rows : ndarray, (n,)
-        Of the table that are used; none of a receiver without positions.
+        Of the table that are used; none of a receiver without positions, or with few.
     at : ndarray, (n,), s
         Their instants.
     steps : ndarray, (n - 1, 3), m
@@ -340,7 +340,7 @@ def _steps(
     at = index_of(table) - aid.time_offset
     used = usable(table, POSITION_SD) & np.isin(table["quality"], aid.qualities)
     rows = np.flatnonzero(used & (at >= own.index[0]) & (at <= own.index[-1]))
-    if len(rows) < 2 * BESIDE or not aid.use_position:
+    if len(rows) < 4 * BESIDE or not aid.use_position:
         return rows[:0], at[:0], np.empty((0, 3)), np.empty((0, 3))
     place, at = values_of(table, GEODETIC)[rows], at[rows]
     way, told = _way(record, at, np.asarray(aid.lever_arm))

@@ -38,7 +38,7 @@ from strapdown.evaluation.trajectory_differences import (
     trajectory_differences,
 )
 from strapdown.nav_state import NavState
-from strapdown.navigation.blame import blame
+from strapdown.navigation.blame import CONTINUED, blame
 from strapdown.navigation.filter_options import DAMPINGS
 from strapdown.navigation.integrity import (
     GAIN_EACH,
@@ -112,9 +112,9 @@ BEGUN, ENDED = 0.15, 0.8
 GRADES, COARSER = ("tactical-grade", "industrial-grade", "consumer-grade"), 3.0
 #: How often a run is repeated at most that is contradicted for longer than receivers are at fault.
 RECOVERIES = 4
-#: An estimated time offset, s, over which a run is repeated with it, and by how many of its
-#: standard deviations it differs from zero.
-CONTINUED, SURELY = 0.05, 3.0
+#: By how many of its standard deviations an estimated time offset over `CONTINUED` differs from
+#: zero, with which a run is repeated.
+SURELY = 3.0
 #: An offset, s, by which two explanations of a record differ at least.
 SETTLED = 0.01
 #: How often at most: by a second, states of sensors take a part of it, and each run finds some of
