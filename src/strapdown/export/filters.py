@@ -1,4 +1,4 @@
-"""An orientation filter as one C99 file: header, interface, kernels, test."""
+"""An orientation filter as one file for a device: what its template is filled with."""
 
 from __future__ import annotations
 
@@ -14,22 +14,9 @@ from strapdown import rotation
 from strapdown._kernels import arithmetic, orientation
 from strapdown.constants import CORTEX_M4F_CYCLES, Array
 from strapdown.errors import DataError
-from strapdown.export.algorithms import ANGLES
 from strapdown.export.configuration import SensorConfiguration
-from strapdown.export.device import comment, device_translator, number, unpacked
 from strapdown.export.kernels import Kernels
-from strapdown.export.program import (
-    ROUNDINGS,
-    SAMPLES,
-    Vector,
-    attitude_harness,
-    attitude_test,
-    c_rows,
-    constant_lines,
-    precision_lines,
-    unit_lines,
-)
-from strapdown.export.types_of_c import wrapped
+from strapdown.export.program import ROUNDINGS, SAMPLES, Vector, c_file, python_file
 from strapdown.orientation_filters import OrientationEstimator
 from strapdown.orientation_filters.cost import count_filter_cost
 from strapdown.tables import ACCEL, GYRO, MAG
@@ -42,8 +29,9 @@ MISSING = 1e30
 NO_FIELD = {"usable(mx, my, mz)": 0.0, "r[FIELDS]": 0.0, "r[HEADED]": 0.0}
 
 
-def filter_in_c(
+def filter_file(
     chosen: OrientationEstimator,
+    language: str,
     *,
     magnetometer: bool,
     sampling: str,
@@ -51,53 +39,41 @@ def filter_in_c(
     imu: pd.DataFrame | None = None,
     configuration: SensorConfiguration | None = None,
 ) -> str:
-    """Write an orientation filter as one C99 file with its own test: `export_c`."""
+    """Write an orientation filter as one file with its own test: `export_c`.
+
+    `language` ({'c', 'py'}): C99 or MicroPython.
+    """
     kernels = filter_kernels(chosen, magnetometer, sampling)
-    translator = device_translator()
-    functions = kernels.in_c(translator)
-    sensors = SENSORS[: 2 + magnetometer]
-    field = ", const real_t *mag" if magnetometer else ""
-    interface = _INTERFACE.format(
-        size=chosen.size,
-        field=field,
-        heads=" and the first field heads" if magnetometer else "",
-        fields=", mag the field in any unit" if magnetometer else "",
-        north=_north(chosen, magnetometer),
-    )
-    ends = _ENDS.format(
-        begin=_begin(chosen, sampling),
-        sample=sample_kernel(chosen),
-        field=field,
-        fields=", m[0], m[1], m[2]" if magnetometer else "",
-        missing=_MISSING_FIELD if magnetometer else "",
-        turn=_turn(chosen, magnetometer),
-        angles=ANGLES,
-    )
-    if states_deviation(chosen):
-        interface += _SD_PROTOTYPE
-        ends += _sd(chosen, magnetometer)
-    if configuration is not None:
-        interface += _SAMPLE_PROTOTYPE.format(field=field)
-        ends += (
-            "\n"
-            + unit_lines(configuration, sensors).rstrip("\n")
-            + "\n"
-            + _sample(configuration, magnetometer)
-        )
+    always, then = begun_numbers(chosen, sampling)
     vector = filter_vector(chosen, magnetometer, sampling, q_nb, imu, configuration)
-    body = "\n".join([*functions, ends])
-    raw = configuration is not None
-    start = None if q_nb is None else rotation.normalise(q_nb)
-    harness = attitude_harness(_take(magnetometer, raw), _columns(magnetometer, raw), vector, start)
-    parts = [
-        _header(chosen, magnetometer, sampling, configuration),
-        precision_lines(body, translator.names.text),
-        interface,
-        constant_lines(kernels),
-        body,
-        attitude_test(harness, vector, bound_words(vector)),
-    ]
-    return "\n".join(parts)
+    half = 0.5 * radians(chosen.declination)
+    facts = {
+        "size": chosen.size,
+        "magnetometer": magnetometer,
+        "always": always,
+        "then": then,
+        "kernel": sample_kernel(chosen),
+        "turn": (cos(half), sin(half)) if magnetometer and chosen.declination else None,
+        "deviation": states_deviation(chosen),
+        "field_variance": radians(getattr(chosen, "field", 0.0)) ** 2,
+        "lag": 0,
+        "start": None if q_nb is None else tuple(rotation.normalise(q_nb).tolist()),
+        "vector": vector,
+        "sensors": {
+            name: getattr(configuration, name, None) for name in SENSORS[: 2 + magnetometer]
+        },
+        "configuration": configuration,
+    }
+    if language == "py":
+        mean = "the mean over the dt that ends with it" if sampling == "mean" else "at its instant"
+        head = [title_of(chosen, magnetometer), f"{chosen.label}. A sample is {mean}"]
+        return python_file("filter", head, kernels, {**facts, "title": chosen.title})
+    facts |= {
+        "north": _north(chosen, magnetometer),
+        "row_words": _columns(magnetometer, configuration is not None),
+        "bound": bound_words(vector),
+    }
+    return c_file("filter", _head(chosen, magnetometer, sampling, configuration), kernels, facts)
 
 
 def sample_kernel(chosen: OrientationEstimator) -> str:
@@ -142,8 +118,10 @@ def title_of(chosen: OrientationEstimator, magnetometer: bool) -> str:
     return f"{chosen.title} for {sensors}, {chosen.source}"
 
 
-def begin_lines(chosen: OrientationEstimator, sampling: str) -> tuple[list[str], list[str]]:
-    """Numbers of the record before the first sample, ``[index] value``: of none, of an attitude.
+def begun_numbers(
+    chosen: OrientationEstimator, sampling: str
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Numbers of the record before the first sample, by their index: of none, of an attitude.
 
     Those of the options and of the attitude itself are not among them.
     """
@@ -152,28 +130,22 @@ def begin_lines(chosen: OrientationEstimator, sampling: str) -> tuple[list[str],
     skip = {orientation.Q, orientation.MEAN, *range(first, first + len(chosen.kernel_options()))}
     names = {getattr(orientation, n): n for n in ("LEVELED", "POWER")}
 
-    def line(index: int, value: float) -> str:
-        name = names.get(index, str(index))
-        if index >= orientation.P and states_deviation(chosen):
-            name = f"P + {index - orientation.P}"
-        return f"[{name}] {value!r}"
+    def index(at: int) -> str:
+        if at >= orientation.P and states_deviation(chosen):
+            return f"P + {at - orientation.P}"
+        return names.get(at, str(at))
 
-    always = [line(i, float(v)) for i, v in enumerate(free) if v and i not in skip]
-    then = [
-        line(int(i), float(given[i])) for i in np.flatnonzero(free != given) if int(i) not in skip
-    ]
-    return always, then
+    always = {index(i): float(v) for i, v in enumerate(free) if v and i not in skip}
+    changed = [int(i) for i in np.flatnonzero(free != given) if int(i) not in skip]
+    return always, {index(i): float(given[i]) for i in changed}
 
 
-# The C code around the kernels.
-
-
-def _header(
+def _head(
     chosen: OrientationEstimator,
     magnetometer: bool,
     sampling: str,
     configuration: SensorConfiguration | None,
-) -> str:
+) -> list[str]:
     version = importlib.import_module("strapdown").__version__
     sensors = SENSORS[: 2 + magnetometer]
     step = 0.01 if configuration is None else 1.0 / configuration.rate_hz
@@ -183,7 +155,7 @@ def _header(
     )
     mean = "the mean over the dt that ends with it" if sampling == "mean" else "at its instant"
     columns = "gx gy gz ax ay az" + (" mx my mz" if magnetometer else "")
-    lines = [
+    return [
         f"{title_of(chosen, magnetometer)}.",
         f"{chosen.label}, written by strapdown {version} from the kernels that it runs itself. "
         f"A sample is {mean}.",
@@ -199,7 +171,6 @@ def _header(
         "and writes a quaternion for each.",
         "SPDX-License-Identifier: MIT. Copyright (c) 2026 The strapdown developers.",
     ]
-    return "\n".join(comment("\n\n".join(lines))) + "\n"
 
 
 def _north(chosen: OrientationEstimator, magnetometer: bool) -> str:
@@ -210,198 +181,12 @@ def _north(chosen: OrientationEstimator, magnetometer: bool) -> str:
     return " of magnetic north"
 
 
-_INTERFACE = """\
-struct attitude {{
-    real_t record[{size}];
-}};
-
-/* Start from an attitude, a quaternion of any length but zero, or from none (a null pointer): the
- * first specific force levels the body{heads}, moving or not.
- */
-void attitude_init(struct attitude *a, const real_t *q_nb);
-
-/* Take a sample: dt in s since the last sample that was taken, gyro in rad/s, accel the specific
- * force in m/s²{fields}; a null pointer for a sensor that has no new sample.
- * Returns 0, or 1 for a sample that is refused (dt not above zero, or a rate that is not finite);
- * it then has changed nothing. The dt of the first sample is not looked at.
- */
-int attitude_update(struct attitude *a, real_t dt, const real_t gyro[3],
-    const real_t *accel{field});
-
-/* The attitude as a unit quaternion,{north}. */
-void attitude_quaternion(const struct attitude *a, real_t q_nb[4]);
-
-/* The attitude as roll, pitch and heading, rad. */
-void attitude_euler(const struct attitude *a, real_t euler[3]);
-
-/* The estimated gyro bias, rad/s: beyond the one that was subtracted. */
-void attitude_gyro_bias(const struct attitude *a, real_t bias[3]);
-"""
-_SD_PROTOTYPE = """
-/* Standard deviations of roll, pitch and heading, rad: 95 % are 1.96 of them. */
-void attitude_euler_sd(const struct attitude *a, real_t sd[3]);
-"""
-_SAMPLE_PROTOTYPE = """
-/* Take raw readings of the sensors, x, y, z in their own units and axes, a step after those before,
- * and give the attitude. Returns as attitude_update, which takes numbers of the body and any step,
- * as after a lost sample; a null pointer as there.
- */
-int attitude_sample(struct attitude *a, const real_t gyro[3],
-    const real_t *accel{field}, real_t q_nb[4]);
-"""
-
-_ENDS = """\
-void attitude_init(struct attitude *a, const real_t *q_nb)
-{{
-    real_t *r = a->record;
-    for (int i = 0; i < (int)(sizeof a->record / sizeof r[0]); i++) {{
-        r[i] = R(0.0);
-    }}
-    r[Q] = R(1.0);
-{begin}}}
-
-int attitude_update(struct attitude *a, real_t dt, const real_t gyro[3],
-    const real_t *accel{field})
-{{
-    static const real_t none[3] = {{LARGEST, LARGEST, LARGEST}};
-    const real_t *f = accel ? accel : none;
-{missing}    /* Written so, NaN is refused, too. The first sample ends no step. */
-    if (!((dt > R(0.0) && dt < LARGEST) || a->record[SAMPLES] == R(0.0))
-        || !usable(gyro[0], gyro[1], gyro[2])) {{
-        return 1;
-    }}
-    {sample}(a->record, dt, gyro[0], gyro[1], gyro[2], f[0], f[1],
-        f[2]{fields});
-    return 0;
-}}
-
-void attitude_quaternion(const struct attitude *a, real_t q_nb[4])
-{{
-    const real_t *r = a->record;
-    const real_t w = r[Q], x = r[Q + 1], y = r[Q + 2], z = r[Q + 3];
-{turn}}}
-
-void attitude_euler(const struct attitude *a, real_t euler[3])
-{{
-    real_t q[4];
-    attitude_quaternion(a, q);
-{angles}
-}}
-
-void attitude_gyro_bias(const struct attitude *a, real_t bias[3])
-{{
-    for (int i = 0; i < 3; i++) {{
-        bias[i] = a->record[BIAS + i];
-    }}
-}}
-"""
-_MISSING_FIELD = "    const real_t *m = mag ? mag : none;\n"
-_TARGETS = [f"q_nb[{i}]" for i in range(4)]
-
-
-def _begin(chosen: OrientationEstimator, sampling: str) -> str:
-    always, then = (
-        [f"r{head}] = {number(float(value))};" for head, value in (x.split("] ") for x in lines)]
-        for lines in begin_lines(chosen, sampling)
-    )
-    unit = "quat_normalise(q_nb[0], q_nb[1], q_nb[2], q_nb[3])"
-    given = unpacked(unit, ("r[Q]", "r[Q + 1]", "r[Q + 2]", "r[Q + 3]"), " " * 8)
-    lines = [
-        *(f"    {line}" for line in always),
-        *("    if (q_nb) {", given),
-        *(f"        {line}" for line in then),
-        "    }",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _turn(chosen: OrientationEstimator, magnetometer: bool) -> str:
-    plain = unpacked("quat_normalise(w, x, y, z)", _TARGETS) + "\n"
-    if not (magnetometer and chosen.declination):
-        return plain
-    half = 0.5 * radians(chosen.declination)
-    c, s = number(cos(half)), number(sin(half))
-    turned = "c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w"
-    return (
-        f"    /* From magnetic to true north: half of the declination. */\n"
-        f"    const real_t c = {c}, s = {s};\n"
-        "    if (r[HEADED] == R(0.0)) {\n"
-        + unpacked("quat_normalise(w, x, y, z)", _TARGETS, " " * 8)
-        + "\n        return;\n    }\n"
-        + unpacked(f"quat_normalise({turned})", _TARGETS)
-        + "\n"
-    )
-
-
-def _sd(chosen: OrientationEstimator, magnetometer: bool) -> str:
-    own = radians(getattr(chosen, "field", 0.0)) ** 2
-    dd = "p[2 * N + 2]"
-    if magnetometer:
-        dd += f" + (r[HEADED] != R(0.0) ? {number(own)} : R(0.0))"
-    terms = f"r[Q], r[Q + 1], r[Q + 2], r[Q + 3], p[0], p[1], p[2], p[N + 1], p[N + 2], {dd}"
-    lines = unpacked(f"euler_deviation({terms})", ("sd[0]", "sd[1]", "sd[2]"))
-    return f"""
-void attitude_euler_sd(const struct attitude *a, real_t sd[3])
-{{
-    const real_t *r = a->record, *p = a->record + P;
-{lines}
-}}
-"""
-
-
-def _sample(configuration: SensorConfiguration, magnetometer: bool) -> str:
-    gyro, accel, mag = (
-        c_rows(getattr(configuration, name), name, f"{name.upper()}_UNIT") for name in SENSORS
-    )
-    field = ", const real_t *mag" if magnetometer else ""
-
-    def when(name: str, values: str) -> str:
-        rows = [" ".join(v.split()) for v in values.split(",\n") if v.strip()]
-        text = "".join(
-            f"{line}\n"
-            for i, row in enumerate(rows)
-            for line in wrapped(f"{name}_b[{i}] = {row};", "        ")
-        )
-        return f"    if ({name}) {{\n{text}    }}\n"
-
-    arrays = "accel_b[3] = {R(0.0), R(0.0), R(0.0)}"
-    if magnetometer:
-        arrays += ", mag_b[3] = {R(0.0), R(0.0), R(0.0)}"
-    return (
-        "\nint attitude_sample(struct attitude *a, const real_t gyro[3],\n    const real_t *accel"
-        f"{field}, real_t q_nb[4])\n{{\n    const real_t gyro_b[3] = {{\n{gyro}    }};\n"
-        f"    real_t {arrays};\n"
-        + when("accel", accel)
-        + (when("mag", mag) if magnetometer else "")
-        + "    const int refused = attitude_update(a, ATTITUDE_STEP, gyro_b, accel ? accel_b : 0"
-        + (",\n        mag ? mag_b : 0" if magnetometer else "")
-        + ");\n    attitude_quaternion(a, q_nb);\n    return refused;\n}\n"
-    )
-
-
-# How the test passes samples.
-
-
 def _columns(magnetometer: bool, raw: bool) -> str:
     what = (
         "raw readings of gyro, accelerometer" if raw else "dt in s, rates in rad/s, forces in m/s²"
     )
     field = (", magnetometer" if raw else ", fields") if magnetometer else ""
     return f"{what}{field}; 1e30 where there is none"
-
-
-def _take(magnetometer: bool, raw: bool) -> str:
-    first = 0 if raw else 1
-    lines = []
-    for k, name in enumerate(SENSORS[: 2 + magnetometer]):
-        values = ", ".join(f"R(v[{first + 3 * k + i}])" for i in range(3))
-        lines.append(f"    const real_t {name}[3] = {{{values}}};")
-    field = f", v[{first + 6}] < 1e29 ? mag : 0" if magnetometer else ""
-    given = f"gyro, v[{first + 3}] < 1e29 ? accel : 0{field}"
-    if raw:
-        lines.append("    real_t turned[4];")
-    call = f"sample(s, {given}, turned)" if raw else f"update(s, R(v[0]), {given})"
-    return "\n".join([*lines, *wrapped(f"const int refused = attitude_{call};", "    ")])
 
 
 # The test vector.

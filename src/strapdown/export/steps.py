@@ -17,16 +17,9 @@ from strapdown.dsp.decimation import FirDecimation, fir_decimation
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.export.cost import most_operations
-from strapdown.export.device import comment, device_translator, number, unpacked
+from strapdown.export.device import device_translator, number
 from strapdown.export.kernels import Kernels
-from strapdown.export.program import (
-    Harness,
-    StepParts,
-    constant_lines,
-    listed,
-    precision_lines,
-    step_test,
-)
+from strapdown.export.program import StepParts, constant_lines, tested_rows, written
 from strapdown.mechanization import Mechanization, NorthEastDown, WanderAzimuth
 from strapdown.nav_state import NavState
 from strapdown.tables.checks import Array
@@ -36,165 +29,6 @@ from strapdown.tables.checks import Array
 #: Start of the test: latitude and longitude in rad, m; m/s; and the attitude.
 PLACE, VELOCITY = (0.96875, 0.65625, 150.0), (20.0, -30.0, 0.5)
 ATTITUDE = tuple(rotation.quaternion_from_euler([5.0, -10.0, 130.0]).tolist())
-
-_NAVIGATION = """\
-struct navigation {{
-{state}
-    real_t state[{size}];
-}};
-
-/* Start: latitude and longitude in rad, height over the ellipsoid in m; velocity north, east, down
- * in m/s; unit quaternion body to north-east-down.
- */
-void navigation_init(struct navigation *n, const real_t place[3], const real_t v_n[3],
-    const real_t q_nb[4]);
-
-/* Motion increments between two samples, rates in rad/s and specific forces in m/s² at their
- * instants and linear between: rotation vector in rad, and the first and second integral of the
- * specific force in the body axes of the start, m/s and m.
- */
-void navigation_increments(real_t dt, const real_t gyro_before[3], const real_t accel_before[3],
-    const real_t gyro[3], const real_t accel[3], real_t increments[9]);
-
-{about}
-int navigation_step(struct navigation *n, real_t dt, const real_t increments[9]{argument});
-
-/* Position, velocity and attitude, as of navigation_init{wrap}. */
-void navigation_read(const struct navigation *n, real_t place[3], real_t v_n[3], real_t q_nb[4]);
-"""
-
-_NAVIGATION_CODE = """\
-{init}
-void navigation_increments(real_t dt, const real_t gyro_before[3], const real_t accel_before[3],
-    const real_t gyro[3], const real_t accel[3], real_t increments[9])
-{{
-{increments}
-}}
-
-int navigation_step(struct navigation *n, real_t dt, const real_t increments[9]{argument})
-{{
-    /* Semi-major axis in m, square of the eccentricity, gravity at the equator in m/s²,
-     * Somigliana's constant, rate of rotation in rad/s, flattening, centrifugal over gravity.
-     */
-    static const real_t earth[7] = {{
-        {earth}}};
-    /* Mode of the height and time constant of its loop in s, decrease of gravity with height in
-     * 1/s²; limits: cosine of the latitude, speed in m/s, heights in m.
-     */
-    static const real_t options[7] = {{
-        {options}}};
-    real_t row[1][10], history[1][{width}];
-    if (!(dt > R(0.0) && dt < LARGEST)) {{
-        return -1;
-    }}
-    row[0][0] = dt;
-    for (int i = 0; i < 9; i++) {{
-        row[0][1 + i] = increments[i];
-    }}
-    return {advance}(n->state, row{reference}, earth, options, history);
-}}
-
-{read}"""
-
-_NED_INIT = """\
-void navigation_init(struct navigation *n, const real_t place[3], const real_t v_n[3],
-    const real_t q_nb[4])
-{{
-    real_t *s = n->state;
-    const real_t sine = SIN(place[0]);
-    for (int i = 0; i < 3; i++) {{
-        s[i] = place[i];
-        s[3 + i] = v_n[i];
-    }}
-{held}    for (int i = 0; i < 4; i++) {{
-        s[6 + i] = q_nb[i];
-    }}
-    s[10] = sine;
-    s[11] = COS(place[0]);
-    s[12] = R(1.0) / SQRT(R(1.0) - {squared} * sine * sine);
-    s[13] = R(0.0);
-    s[14] = R(0.0);
-}}
-"""
-
-_NED_READ = """\
-void navigation_read(const struct navigation *n, real_t place[3], real_t v_n[3], real_t q_nb[4])
-{
-    for (int i = 0; i < 3; i++) {
-        place[i] = n->state[i];
-        v_n[i] = n->state[3 + i];
-    }
-    for (int i = 0; i < 4; i++) {
-        q_nb[i] = n->state[6 + i];
-    }
-}
-"""
-
-_WANDER_INIT = """\
-void navigation_init(struct navigation *n, const real_t place[3], const real_t v_n[3],
-    const real_t q_nb[4])
-{{
-    real_t *s = n->state;
-    const real_t sine = SIN(place[0]);
-    for (int i = 0; i < {size}; i++) {{
-        s[i] = R(0.0);
-    }}
-    const real4 ew = wander_from_geodetic(place[0], place[1], R(0.0));
-    s[0] = ew.f0; s[1] = ew.f1; s[2] = ew.f2; s[3] = ew.f3;
-    s[4] = place[2];
-    const real7 level = level_from_north(R(0.0), v_n[0], v_n[1], {down}, q_nb[0], q_nb[1],
-        q_nb[2], q_nb[3]);
-    s[5] = level.f0; s[6] = level.f1; s[7] = level.f2;
-    s[8] = level.f3; s[9] = level.f4; s[10] = level.f5; s[11] = level.f6;
-    const real4 ib = quat_multiply(s[0], s[1], s[2], s[3], s[8], s[9], s[10], s[11]);
-    s[12] = ib.f0; s[13] = ib.f1; s[14] = ib.f2; s[15] = ib.f3;
-    s[24] = R(1.0);
-    s[28] = R(1.0) / SQRT(R(1.0) - {squared} * (sine * sine));
-}}
-"""
-
-_WANDER_READ = """\
-void navigation_read(const struct navigation *n, real_t place[3], real_t v_n[3], real_t q_nb[4])
-{
-    real_t row[1][12], out[1][10];
-    for (int i = 0; i < 12; i++) {
-        row[0][i] = n->state[i];
-    }
-    wander_places(row, out);
-    for (int i = 0; i < 3; i++) {
-        place[i] = out[0][i];
-        v_n[i] = out[0][3 + i];
-    }
-    for (int i = 0; i < 4; i++) {
-        q_nb[i] = out[0][6 + i];
-    }
-}
-"""
-
-_NAVIGATION_START = """\
-    static const real_t place[3] = {{{place}}};
-    static const real_t v_n[3] = {{{velocity}}};
-    static const real_t q_nb[4] = {{
-        {attitude}}};
-    navigation_init(s, place, v_n, q_nb);"""
-
-_NAVIGATION_TAKE = """\
-    real_t increments[9], place[3], v_n[3], q_nb[4];
-    for (int i = 0; i < 9; i++) {{
-        increments[i] = R(v[1 + i]);
-    }}
-    if (navigation_step(s, R(v[0]), increments{argument}) != DONE) {{
-        return 0;
-    }}
-    navigation_read(s, place, v_n, q_nb);
-    for (int i = 0; i < 3; i++) {{
-        out[i] = (double)place[i];
-        out[3 + i] = (double)v_n[i];
-    }}
-    for (int i = 0; i < 4; i++) {{
-        out[6 + i] = (double)q_nb[i];
-    }}
-    return RESULTS;"""
 
 
 def navigation_parts(chosen: Mechanization) -> StepParts:
@@ -221,24 +55,19 @@ def navigation_parts(chosen: Mechanization) -> StepParts:
         kernels.require("wander_from_geodetic")
         kernels.require("wander_places", sizes={"history": (1, 12), "out": (1, 10)})
     ellipsoid = find_ellipsoid(chosen.ellipsoid)
-    squared = number(ellipsoid.eccentricity_squared)
-    held = chosen.height == "held"
     if wander:
-        init = _WANDER_INIT.format(size=size, squared=squared, down="R(0.0)" if held else "v_n[2]")
-        state = (
+        state_words = (
             "Quaternion level to Earth; height, m; velocity in level axes, m/s; quaternions body "
             "to level and body to inertial axes; rounding errors of sums; cosine and sine of half "
             "the Earth's angle; radius of the prime vertical; memory of the height's loop."
         )
+        far = "LEAP (a step of more than 0.01 rad around the Earth)"
     else:
-        init = _NED_INIT.format(
-            squared=squared, held="    s[5] = R(0.0); /* the height is held */\n" if held else ""
-        )
-        state = (
+        state_words = (
             "Latitude, longitude, rad; height, m; velocity, m/s; quaternion body to level; sine "
             "and cosine of the latitude; radius of the prime vertical; memory of the height's loop."
         )
-    argument, reference = (", real_t height", ", &height") if damped else ("", "")
+        far = "POLE (beyond the limit of the latitude)"
     before = [f"{n}_before[{i}]" for n in ("gyro",) for i in range(3)]
     now = [f"gyro[{i}]" for i in range(3)]
     forces = [f"{n}[{i}]" for n in ("accel_before", "accel") for i in range(3)]
@@ -268,9 +97,9 @@ def navigation_parts(chosen: Mechanization) -> StepParts:
         return out[:made]
 
     codes = {"DONE": 0, "POLE": 1, "DIVERGED": 2, "LEAP": 3}
-    far = "LEAP (a step of more than 0.01 rad around the Earth)"
-    pole = "POLE (beyond the limit of the latitude)"
     return StepParts(
+        name="navigation",
+        template="navigation.c.jinja",
         title=f"A step of navigation in {chosen.summary}: {chosen.source}",
         words=(
             "Axes: body forward-right-down; local level north-east-down. A step takes motion "
@@ -284,46 +113,29 @@ def navigation_parts(chosen: Mechanization) -> StepParts:
         before=(motion, "increments"),
         memory=size,
         codes={k: v for k, v in codes.items() if k != ("POLE" if wander else "LEAP")},
-        interface=_NAVIGATION.format(
-            state="\n".join(comment(state, "    ")),
-            size=size,
-            about="\n".join(
-                comment(
-                    "Take a step of dt s with its motion increments"
-                    + (", and the reference height in m (NAN: none)" if damped else "")
-                    + f". Returns DONE; or {far if wander else pole}, DIVERGED (outside the limits "
-                    "of speed and height), or -1 for a dt that is not above zero, and then has "
-                    "changed nothing."
-                )
-            ),
-            argument=argument,
-            wrap="; the longitude is within half a turn" if wander else "",
-        ),
-        code=_NAVIGATION_CODE.format(
-            init=init,
-            increments=unpacked(call, [f"increments[{i}]" for i in range(9)]),
-            argument=argument,
-            earth=listed(earth),
-            options=listed(options),
-            width=chosen.row,
-            advance=advance,
-            reference=reference,
-            read=_WANDER_READ if wander else _NED_READ,
-        ),
-        harness=Harness(
-            "navigation",
-            rows.shape[1],
-            10,
-            "dt and nine increments" + (", and a height" if damped else ""),
-            _NAVIGATION_START.format(
-                place=listed(PLACE), velocity=listed(VELOCITY), attitude=listed(ATTITUDE)
-            ),
-            _NAVIGATION_TAKE.format(argument=", R(v[10])" if damped else ""),
-            answers=True,
-        ),
+        row_words="dt and nine increments" + (", and a height" if damped else ""),
         gives="latitude, longitude, height, velocity and quaternion",
         rows=rows,
         run=run,
+        facts={
+            "about": "Take a step of dt s with its motion increments"
+            + (", and the reference height in m (NAN: none)" if damped else "")
+            + f". Returns DONE; or {far}, DIVERGED (outside the limits of speed and height), or -1 "
+            "for a dt that is not above zero, and then has changed nothing.",
+            "wander": wander,
+            "damped": damped,
+            "held": chosen.height == "held",
+            "state_words": state_words,
+            "size": size,
+            "squared": number(ellipsoid.eccentricity_squared),
+            "motion": call,
+            "earth": earth,
+            "options": options,
+            "width": chosen.row,
+            "place": PLACE,
+            "velocity": VELOCITY,
+            "attitude": ATTITUDE,
+        },
     )
 
 
@@ -411,36 +223,40 @@ def step_in_c(text: str) -> ExportedFile:
         motion, call = parts.before
         operations = dict(Counter(operations) + Counter(most_operations(motion)))
         calls = [call, *calls]
-    body = "\n".join([*functions, parts.code])
-    test = step_test(parts)
     version = importlib.import_module("strapdown").__version__
     counts = ", ".join(f"{count} {kind}" for kind, count in operations.items() if count)
     options = ", ".join(f"{f.name}={_value(getattr(chosen, f.name))}" for f in fields(chosen))
-    name_c = parts.harness.name
-    upper = name_c.upper()
+    upper = parts.name.upper()
     head = [
         f"{parts.title}.",
         f"{name}: {options}. Written by strapdown {version} from the kernels that it runs itself.",
         *parts.words,
-        f"Operations of {' and '.join(f'{name_c}_{call}' for call in calls)}, at most: {counts}. "
-        f"Memory: {parts.memory} numbers between calls, no heap.",
+        f"Operations of {' and '.join(f'{parts.name}_{call}' for call in calls)}, at most: "
+        f"{counts}. Memory: {parts.memory} numbers between calls, no heap.",
         "Double precision; -DREAL=float for single. With -ffp-contract=off it gives the bits of "
         f"strapdown in double precision. Test: cc -std=c99 -O2 -D{upper}_TEST FILE.c -lm && "
-        f"./a.out. With -D{upper}_FILTER it reads lines of {parts.harness.words} and "
+        f"./a.out. With -D{upper}_FILTER it reads lines of {parts.row_words} and "
         f"writes {parts.gives}.",
         "SPDX-License-Identifier: MIT. Copyright (c) 2026 The strapdown developers.",
     ]
     used = {c.name for c in parts.kernels.constants()}
     results = "".join(f"#define {n} {v}\n" for n, v in parts.codes.items() if n not in used)
-    lines = [
-        "\n".join(comment("\n\n".join(head))) + "\n",
-        precision_lines(body + test, translator.names.text, "double"),
-        constant_lines(parts.kernels) + results,
-        parts.interface,
-        body,
-        test,
-    ]
-    return ExportedFile(text, "\n".join(lines), operations, parts.memory)
+    file = written(
+        parts.template,
+        **parts.facts,
+        **tested_rows(parts),
+        name=parts.name,
+        head=head,
+        precision="double",
+        types=translator.names.text,
+        constants=constant_lines(parts.kernels) + results,
+        functions="\n".join(functions),
+        row_words=parts.row_words,
+        answers=parts.answers,
+        lag=0,
+        unit="",
+    )
+    return ExportedFile(text, file, operations, parts.memory)
 
 
 def _value(value: object) -> str:
@@ -458,74 +274,6 @@ def step_parts(text: str) -> tuple[Any, StepParts]:
 
 # Low-pass.
 
-_LOW_PASS = """\
-#define CHANNELS {channels}
-#define WEIGHTS {weights}
-#define FACTOR {factor} /* samples of an output */
-
-struct prefilter {{
-    real_t line[2 * WEIGHTS][CHANNELS]; /* the last samples, twice, so that they are in a row */
-    int at, wait;
-}};
-
-/* Before the first sample. */
-void prefilter_init(struct prefilter *p);
-
-/* Take a sample, all channels at once. Returns 1 where it completes an output, which belongs
- * {delay:.6g} s before it; 0 otherwise, and `out` is then as it was.
- */
-int prefilter_sample(struct prefilter *p, const real_t sample[CHANNELS], real_t out[CHANNELS]);
-"""
-
-_LOW_PASS_CODE = """\
-void prefilter_init(struct prefilter *p)
-{{
-    for (int i = 0; i < 2 * WEIGHTS; i++) {{
-        for (int c = 0; c < CHANNELS; c++) {{
-            p->line[i][c] = R(0.0);
-        }}
-    }}
-    p->at = 0;
-    p->wait = {wait};
-}}
-
-int prefilter_sample(struct prefilter *p, const real_t sample[CHANNELS], real_t out[CHANNELS])
-{{
-    /* Oldest sample first. */
-    static const real_t weights[WEIGHTS] = {{
-        {values}}};
-    real_t row[1][CHANNELS];
-    for (int c = 0; c < CHANNELS; c++) {{
-        p->line[p->at][c] = sample[c];
-        p->line[p->at + WEIGHTS][c] = sample[c];
-    }}
-    p->at = (p->at + 1) % WEIGHTS;
-    p->wait--;
-    if (p->wait > 0) {{
-        return 0;
-    }}
-    p->wait = FACTOR;
-    fir_decimate(p->line + p->at, weights, row);
-    for (int c = 0; c < CHANNELS; c++) {{
-        out[c] = row[0][c];
-    }}
-    return 1;
-}}
-"""
-
-_LOW_PASS_TAKE = """\
-    real_t sample[CHANNELS], filtered[CHANNELS];
-    for (int c = 0; c < CHANNELS; c++) {
-        sample[c] = R(v[c]);
-    }
-    if (!prefilter_sample(s, sample, filtered)) {
-        return 0;
-    }
-    for (int c = 0; c < CHANNELS; c++) {
-        out[c] = (double)filtered[c];
-    }
-    return RESULTS;"""
-
 
 def _low_pass(chosen: LowPass) -> StepParts:
     """Parts of a low-pass."""
@@ -537,9 +285,9 @@ def _low_pass(chosen: LowPass) -> StepParts:
         {"first": (0, 0), "factor": (design.factor, design.factor)},
         sizes={"values": (count, channels), "weights": (count,), "out": (1, channels)},
     )
-    wait = design.centre - design.half + int(design.means) + count
-    rows = np.array([np.zeros(channels), np.full(channels, 2.0)])
     return StepParts(
+        name="prefilter",
+        template="low_pass.c.jinja",
         title=f"Low-pass and decimation from {chosen.from_hz:.10g} to {chosen.rate:.10g} Hz: "
         "windowed sinc, Kaiser (1974)",
         words=(
@@ -550,94 +298,21 @@ def _low_pass(chosen: LowPass) -> StepParts:
         step=step,
         call="sample",
         memory=2 * count * channels + 2,
-        codes={},
-        interface=_LOW_PASS.format(
-            channels=channels, weights=count, factor=design.factor, delay=design.delay
-        ),
-        code=_LOW_PASS_CODE.format(wait=wait, values=listed(design.weights)),
-        harness=Harness(
-            "prefilter",
-            channels,
-            channels,
-            "a number for each channel",
-            "    prefilter_init(s);",
-            _LOW_PASS_TAKE,
-        ),
+        row_words="a number for each channel",
         gives="an output where there is one",
-        rows=rows,
+        answers=False,
+        rows=np.array([np.zeros(channels), np.full(channels, 2.0)]),
         run=lambda given: design.advance(design.begin(channels), given)[1],
+        facts={
+            "weights": design.weights,
+            "factor": design.factor,
+            "delay": design.delay,
+            "wait": design.centre - design.half + int(design.means) + count,
+        },
     )
 
 
 # Measurement updates.
-
-_UPDATE = """\
-#define STATES {n}
-#define OBSERVATIONS {m}
-
-struct covariance {{
-    real_t ud[STATES][STATES]; /* P = U D U': U above the diagonal, D on it, zeros below */
-    real_t x[STATES];          /* estimate */
-}};
-
-{about}
-int covariance_update(struct covariance *c, const real_t z[OBSERVATIONS],
-    real_t H[OBSERVATIONS][STATES], const real_t r[OBSERVATIONS], real_t nu[OBSERVATIONS],
-    real_t s[OBSERVATIONS]);
-"""
-
-_UPDATE_CODE = """\
-int covariance_update(struct covariance *c, const real_t z[OBSERVATIONS],
-    real_t H[OBSERVATIONS][STATES], const real_t r[OBSERVATIONS], real_t nu[OBSERVATIONS],
-    real_t s[OBSERVATIONS])
-{{
-    real_t told[2][OBSERVATIONS];
-{call}
-    for (int j = 0; j < OBSERVATIONS; j++) {{
-        nu[j] = told[0][j];
-        s[j] = told[1][j];
-    }}
-    return bad;
-}}
-"""
-
-_UD_CALL = "    const int bad = ud_update(c->ud, c->x, z, H, r, told);"
-_WD_CALL = """\
-    real_t after[STATES][STATES];
-    const int bad = wd_epoch(c->ud, c->x, z, H, r, told, after);
-    for (int i = 0; i < STATES && bad == -1; i++) {
-        for (int j = 0; j < STATES; j++) {
-            c->ud[i][j] = after[i][j];
-        }
-    }"""
-
-_UPDATE_START = """\
-    for (int i = 0; i < STATES; i++) {
-        for (int j = 0; j < STATES; j++) {
-            s->ud[i][j] = i == j ? R(1.0) : R(0.0);
-        }
-        s->x[i] = R(0.0);
-    }"""
-
-_UPDATE_TAKE = """\
-    real_t z[OBSERVATIONS], H[OBSERVATIONS][STATES], r[OBSERVATIONS];
-    real_t nu[OBSERVATIONS], variance[OBSERVATIONS];
-    for (int j = 0; j < OBSERVATIONS; j++) {
-        z[j] = R(v[j]);
-        r[j] = R(v[OBSERVATIONS + j]);
-        for (int i = 0; i < STATES; i++) {
-            H[j][i] = R(v[2 * OBSERVATIONS + STATES * j + i]);
-        }
-    }
-    if (covariance_update(s, z, H, r, nu, variance) != -1) {
-        return 0;
-    }
-    for (int i = 0; i < STATES; i++) {
-        out[i] = (double)s->x[i];
-        out[STATES + i] = (double)s->ud[i][i];
-        out[2 * STATES + i] = (double)s->ud[0][i];
-    }
-    return RESULTS;"""
 
 
 def _update(chosen: Update, weighted: bool) -> StepParts:
@@ -673,6 +348,8 @@ def _update(chosen: Update, weighted: bool) -> StepParts:
         return out
 
     return StepParts(
+        name="covariance",
+        template="update.c.jinja",
         title=f"Measurement update of {n} states by {m} observations in "
         + (
             "W-D form: Chernodarov (2009), Eqs. (9)-(15)"
@@ -688,35 +365,21 @@ def _update(chosen: Update, weighted: bool) -> StepParts:
         step=step,
         call="update",
         memory=n * n + n,
-        codes={},
-        interface=_UPDATE.format(
-            n=n,
-            m=m,
-            about="\n".join(
-                comment(
-                    "Take the scalar observations z of an epoch one after the other: rows of H, "
-                    "and variances r of errors that are independent of each other. Fills "
-                    "innovations, each after those before it, and their variances h P h' + r. "
-                    "Returns -1; or the index of an observation that is not finite or has a "
-                    "negative variance"
-                    + (", or -2 - i for a variance of state i" if weighted else "")
-                    + ": the structure is then undefined."
-                )
-            ),
-        ),
-        code=_UPDATE_CODE.format(call=_WD_CALL if weighted else _UD_CALL),
-        harness=Harness(
-            "covariance",
-            rows.shape[1],
-            3 * n,
-            "observations, their variances, and the rows of H",
-            _UPDATE_START,
-            _UPDATE_TAKE,
-            answers=True,
-        ),
+        row_words="observations, their variances, and the rows of H",
         gives="the estimate, D and the first row of U",
         rows=rows,
         run=run,
+        facts={
+            "n": n,
+            "m": m,
+            "weighted": weighted,
+            "about": "Take the scalar observations z of an epoch one after the other: rows of H, "
+            "and variances r of errors that are independent of each other. Fills innovations, each "
+            "after those before it, and their variances h P h' + r. Returns -1; or the index of an "
+            "observation that is not finite or has a negative variance"
+            + (", or -2 - i for a variance of state i" if weighted else "")
+            + ": the structure is then undefined.",
+        },
     )
 
 

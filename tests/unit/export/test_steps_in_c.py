@@ -56,7 +56,7 @@ def drawn(parts, count=300):
 
 def through_c(folder, variant, rows, *flags):
     made, (_, parts) = step_in_c(variant), step_parts(variant)
-    program = build(folder, made.text, f"-D{parts.harness.name.upper()}_FILTER", *flags)
+    program = build(folder, made.text, f"-D{parts.name.upper()}_FILTER", *flags)
     given = "\n".join(" ".join(repr(float(v)) for v in row) for row in rows)
     return np.array([line.split() for line in run(program, given).splitlines()], dtype=float)
 
@@ -84,7 +84,7 @@ def test_it_gives_the_bits_of_the_kernels(tmp_path, variant):
 def test_its_own_test_passes(tmp_path, variant, real):
     text = step_in_c(variant).text
     assert max(map(len, text.splitlines())) <= 100
-    name = step_parts(variant)[1].harness.name.upper()
+    name = step_parts(variant)[1].name.upper()
     out = run(build(tmp_path, text, "-O0", f"-DREAL={real}", f"-D{name}_TEST"))
     assert out.rstrip().endswith("passed")
 
@@ -108,7 +108,7 @@ def test_its_own_test_passes(tmp_path, variant, real):
     ],
 )
 def test_its_own_test_can_fail(tmp_path, variant, right, wrong):
-    text, name = step_in_c(variant).text, step_parts(variant)[1].harness.name.upper()
+    text, name = step_in_c(variant).text, step_parts(variant)[1].name.upper()
     assert text.count(right) == 1
     program = build(tmp_path, text.replace(right, wrong), "-O0", f"-D{name}_TEST")
     done = subprocess.run([program], capture_output=True, text=True, check=False)
@@ -146,7 +146,7 @@ def test_an_invalid_observation_is_refused(tmp_path, variant):
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler: install g++")
 @pytest.mark.parametrize("variant", ["ned:height=damped", "wander_azimuth", "low_pass", "wd"])
 def test_it_is_cplusplus_too(tmp_path, variant):
-    name = step_parts(variant)[1].harness.name.upper()
+    name = step_parts(variant)[1].name.upper()
     (tmp_path / "step.cpp").write_text(step_in_c(variant).text, encoding="utf-8")
     flags = [f for f in WARNINGS if f not in ("-std=c99", "-Wmissing-prototypes")]
     command = ["g++", "-std=c++11", *flags, f"-D{name}_TEST", "step.cpp", "-o", "step"]
@@ -216,7 +216,7 @@ def test_no_run_takes_more_operations(variant):
     names[parts.step.name](*given)
     most = most_operations(parts.step)
     assert all(count[kind] <= most[kind] for kind in most)
-    if parts.harness.name != "navigation":
+    if parts.name != "navigation":
         assert {kind: count[kind] for kind in most} == most
     else:
         # A small rotation takes the series: nothing else has two ways.
@@ -226,7 +226,7 @@ def test_no_run_takes_more_operations(variant):
 def _arguments(variant, parts, rows, array):
     """What the kernel of a step is given, by the names of its parameters."""
     chosen = step_parts(variant)[0]
-    if parts.harness.name == "navigation":
+    if parts.name == "navigation":
         state = chosen.begin(NavState.of_numbers(0.0, np.array([*PLACE, *VELOCITY, *ATTITUDE])))
         held = {
             "state": state,
@@ -236,7 +236,7 @@ def _arguments(variant, parts, rows, array):
             "options": chosen.kernel_options(),
             "history": np.zeros((1, chosen.row)),
         }
-    elif parts.harness.name == "prefilter":
+    elif parts.name == "prefilter":
         weights = chosen.design().weights
         shape = (len(weights), chosen.channels)
         held = {"values": np.ones(shape), "weights": weights, "out": np.zeros((1, chosen.channels))}
