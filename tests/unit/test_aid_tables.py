@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from tests.coded import coded
 
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import DataError
 from strapdown.tables import (
     barometer_from_pressure,
     barometer_table,
     body_velocity_table,
     check_odometer,
     heading_table,
-    odometer_from_distance,
     odometer_table,
 )
 from strapdown.tables.aiding import standard_height, standard_slope
@@ -173,33 +172,3 @@ def test_the_slope_is_the_derivative_of_the_height():
     assert standard_slope([101_325.0])[0] == pytest.approx(-0.0832, abs=1e-4)
     table = barometer_from_pressure(TIME, np.full(6, 101_325.0), 12.0)
     assert table["height_sd"].iloc[0] == pytest.approx(1.0, abs=0.01)
-
-
-def test_a_counter_gives_speeds_of_the_middles():
-    """At constant acceleration the mean over a step is the speed of its middle, exactly."""
-    time = np.array([0.0, 0.1, 0.25, 0.4, 0.7])
-    table = odometer_from_distance(time, 3.0 * time + 0.5 * 2.0 * time**2, 0.02)
-    middle = 0.5 * (time[1:] + time[:-1])
-    np.testing.assert_allclose(table.index, middle, rtol=1e-15)
-    np.testing.assert_allclose(table["speed"], 3.0 + 2.0 * middle, rtol=1e-12)
-    np.testing.assert_allclose(table["speed_sd"], 0.02 / np.sqrt(6.0) / np.diff(time), rtol=1e-12)
-
-
-def test_counts_are_as_uncertain_as_it_says():
-    """Of 20000 steps whose counts fall anywhere, the standard deviation is within 1 percent."""
-    time = np.arange(20_000) * 0.1
-    way = 7.3 * time + 30.0 * np.sin(0.05 * time)
-    quantum = 0.05
-    counted = quantum * np.floor(way / quantum)
-    table = odometer_from_distance(time, counted, quantum)
-    middle = table.index.to_numpy()
-    off = table["speed"].to_numpy() - (7.3 + 1.5 * np.cos(0.05 * middle))
-    assert off.std() == pytest.approx(table["speed_sd"].iloc[0], rel=0.03)
-
-
-def test_a_counter_that_was_set_back_is_told():
-    found = refused(odometer_from_distance, TIME, [0, 10, 20, 65_000.0, 65_010, 65_020], 0.1)
-    assert (found.row, found.quantity) == (4, "distance")
-    assert "reset" in found.what
-    with pytest.raises(ConfigError, match="quantum"):
-        odometer_from_distance(TIME, TIME, 0.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -150,61 +150,6 @@ class Entry:
             velocity=_times(speed, along),
             heading_deg=heading_deg,
             unknowns=tuple((a, b, c) for a, b, c in unknowns if any(c)),
-            **others,
-        )
-
-    @classmethod
-    def from_covariance(
-        cls,
-        time: float,
-        velocity: Sequence[float],
-        roll_pitch_heading: Sequence[float],
-        covariance: Array,
-        *,
-        contributor: str = "entry state",
-        **others: Any,
-    ) -> Entry:
-        """Create an entry from a state with a joint covariance, as from an estimator.
-
-        Parameters
-        ----------
-        time : float, s
-        velocity : sequence of float, (3,), m/s
-        roll_pitch_heading : sequence of float, (3,), deg
-        covariance : ndarray, (6, 6)
-            Of the rotation vector in local level, rad, and of the velocity, m/s.
-        contributor : str
-        **others
-            Attributes of the class.
-
-        Raises
-        ------
-        ConfigError
-            The covariance is not symmetric or not positive.
-        """
-        given = np.asarray(covariance, dtype=np.float64)
-        if given.shape != (6, 6) or not np.allclose(given, given.T, rtol=1e-9, atol=0.0):
-            raise ConfigError("crash.no-symmetric-matrix-x", quantity="covariance")
-        values, vectors = np.linalg.eigh(given)
-        if values[0] < -1e-9 * values[-1]:
-            raise ConfigError(
-                "crash.covariance-not-positive", quantity="covariance", values=values[0]
-            )
-        columns = vectors * np.sqrt(np.maximum(values, 0.0))
-        roll, pitch, heading = triple(
-            roll_pitch_heading, "roll_pitch_heading", "sensors.angles-not-three-numbers"
-        )
-        north, east, down = triple(velocity, "velocity", "crash.velocity-not-three-numbers")
-        return cls(
-            time=time,
-            velocity=(north, east, down),
-            heading_deg=heading,
-            unknowns=tuple(
-                (f"{contributor} {k + 1}", contributor, (*columns[:, k].tolist(), 0.0, 0.0, 0.0))
-                for k in range(6)
-                if columns[:, k].any()
-            ),
-            attitude_deg=(roll, pitch),
             **others,
         )
 

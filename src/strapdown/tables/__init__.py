@@ -47,7 +47,6 @@ from strapdown.tables.aiding import (
     body_velocity_table,
     check_odometer,
     heading_table,
-    odometer_from_distance,
     odometer_table,
 )
 from strapdown.tables.checks import (
@@ -136,7 +135,6 @@ __all__ = [
     "imu_table",
     "increments_table",
     "motion_increments_table",
-    "odometer_from_distance",
     "odometer_table",
     "places_of",
     "references_table",

@@ -8,16 +8,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import DataError
 from strapdown.tables.checks import (
     Array,
     as_array,
     check_rows,
-    check_same_length,
-    check_time,
     checked_values,
     each_row,
-    is_number,
     joined,
     refuse_cell,
     refuse_row,
@@ -286,63 +283,6 @@ def odometer_table(
     table = joined(time, ODOMETER, source, **blocks)
     check_odometer(table)
     return table
-
-
-def odometer_from_distance(
-    time: ArrayLike, distance: ArrayLike, quantum: float, source: str | None = None
-) -> pd.DataFrame:
-    """Make an Odometer table from a distance counter.
-
-    The mean speed between two rows is that at the middle of the step, up to ``dt² / 24`` times the
-    derivative of the acceleration. Each count is off by up to half a `quantum`, uniformly, which
-    makes the standard deviation of the speed ``quantum / (√6 dt)``. Errors of consecutive steps are
-    negatively correlated, so treating them as independent is conservative.
-
-    Parameters
-    ----------
-    time : array_like, (n,), s
-    distance : array_like, (n,), m
-        Since any instant; decreasing backwards.
-    quantum : float, m
-        Length of one count: circumference divided by pulses per turn.
-    source : str, optional
-        Name for messages.
-
-    Returns
-    -------
-    DataFrame
-        At the n - 1 midpoints.
-
-    Raises
-    ------
-    ConfigError
-        The quantum is not a positive length.
-    DataError
-        Shapes disagree; time does not advance; the counter was reset or overflowed; or as
-        `check_odometer`.
-    """
-    if not is_number(quantum) or not 0.0 < quantum < math.inf:
-        raise ConfigError("tables.no-length-count", quantity="quantum", quantum=quantum)
-    stamps, way = as_array(time, None, "time", source), as_array(distance, None, "distance", source)
-    check_same_length(source, time=stamps, distance=way)
-    check_time(stamps, source)
-    check_rows(way[:, None], ["distance"], source)
-    dt = np.diff(stamps)
-    speed = np.diff(way) / dt
-    wild = np.flatnonzero(np.abs(speed) > ODOMETER_FASTEST)
-    if wild.size == 1 and len(speed) > 1:
-        row = int(wild[0]) + 1
-        raise DataError(
-            "tables.counter-set-back-or-overflowed",
-            file=source,
-            row=row + 1,
-            quantity="distance",
-            way=way[row - 1],
-            way_2=way[row],
-            dt=dt[row - 1],
-        )
-    sd = quantum / (math.sqrt(6.0) * dt)
-    return odometer_table(0.5 * (stamps[1:] + stamps[:-1]), speed, sd, source)
 
 
 def check_odometer(table: pd.DataFrame) -> None:

@@ -466,7 +466,7 @@ def test_noise_of_a_change_before_after_and_about_the_entry(case, at):
         # So that what the gyros do to the attitude shows beside the noise of the force.
         rate_noise=np.full_like(effects.rate_noise, 0.02),
     )
-    stated = Entry.from_covariance(at, (2.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.zeros((6, 6)))
+    stated = Entry(at, (2.0, 0.0, 0.0), 0.0, attitude_deg=(0.0, 0.0))
     path = reconstruct_path(imu, silent, unit.levelling, None, stated, window=WINDOW)
     runs = sample_paths(path, runs=4000, seed=2).errors[:, :, VELOCITY]
     first, last = np.searchsorted(path.time, [-1e-9, 0.1 - 1e-9])
@@ -523,15 +523,4 @@ def test_what_cannot_be_is_told(case):
         Entry.from_speed(200.0, 1.0)
     with pytest.raises(ConfigError, check=coded("crash.not-possible")):
         Entry.from_speed(20.0, -1.0)
-    with pytest.raises(ConfigError, match="eigenvalue"):
-        Entry.from_covariance(0.0, (7, 0, 0), (0, 0, 0), -np.eye(6))
     assert imu[[*GYRO, *ACCEL]].notna().all().all()
-
-
-def test_an_entry_by_covariance_is_one_by_speed():
-    speed = Entry.from_speed(7.1, 0.05, slip_sd_deg=1.0, climb_sd=0.02, heading_sd_deg=0.5)
-    columns = np.array([u[2] for u in speed.unknowns])[:, :6]
-    joint = columns.T @ columns
-    other = Entry.from_covariance(0.0, speed.velocity, (0, 0, 0), joint)
-    again = np.array([u[2] for u in other.unknowns])[:, :6]
-    assert np.allclose(again.T @ again, joint, atol=1e-15)

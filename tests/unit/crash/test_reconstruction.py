@@ -158,10 +158,6 @@ class TestEntry:
             ),
             (lambda: Entry(0.0, 7.1, 0.0), "three finite numbers are needed"),
             (lambda: Entry(np.nan, (7.1, 0.0, 0.0), 0.0), "entry, time: nan is not a number"),
-            (
-                lambda: Entry.from_covariance(0.0, (7.1, 0.0), (0, 0, 0), np.eye(6)),
-                "three finite numbers are needed",
-            ),
         ],
     )
     def test_bad_numbers(self, make, words):
