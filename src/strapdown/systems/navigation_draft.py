@@ -604,7 +604,7 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
             why = f"Found: {turns}."
         elif name in made.shaken:
             why = (
-                "Found: it shakes far beyond its noise at rest; half of the time so much of it is "
+                "Found: it shakes far beyond its noise at rest; over the record, so much may be "
                 "white, x, y, z"
             )
             why += "; and the gyros drift by it:" if name == "gyro" else ":"

@@ -67,7 +67,7 @@ from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import ORIGIN_STATED, index_of, values_of
 
-#: Windows in which noise is measured, s, and the share taken as the quiet one.
+#: Windows in which noise is measured, s; the share taken as the quiet one, and left out as loudest.
 WINDOW, QUIET = 2.0, 0.05
 #: Ratio to the data-sheet noise beyond which a triad's measured noise is stated instead.
 LOUD = 3.0
@@ -464,7 +464,7 @@ class Scatter(NamedTuple):
     Attributes
     ----------
     quiet, loud : ndarray, per √Hz
-        Densities from sample to sample: while it is quiet, and the median, with vibration.
+        Densities from sample to sample: while it is quiet, and over the record, with vibration.
     white : ndarray, per √Hz
         The part of `loud` that may be white: the least density over averages of up to `SLOWEST`.
     step : float, s
@@ -505,10 +505,13 @@ def _scatter(imu: pd.DataFrame) -> Scatter | None:
             each = max(8, size >> octave)
             second = second[: len(second) // each * each].reshape(-1, each, 3)
             sd = np.sqrt(np.square(second).mean(axis=1) / 6.0) * math.sqrt(interval)
-            usual = np.median(sd, axis=0)
+            # Errors grow by the mean of variances, also of a record that rests most of the time;
+            # without the largest: a door that shuts is no noise of the drive.
+            few = np.sort(sd, axis=0)[: len(sd) - int(QUIET * len(sd))]
+            over = np.sqrt(np.square(few).mean(axis=0))
             if not octave:
-                quiet[k], loud[k], white[k] = np.quantile(sd, QUIET, axis=0), usual, usual
-            white[k] = np.minimum(white[k], usual)
+                quiet[k], loud[k], white[k] = np.quantile(sd, QUIET, axis=0), over, over
+            white[k] = np.minimum(white[k], over)
     return Scatter(quiet, loud, white, step) if quiet.min() > 0.0 else None
 
 
