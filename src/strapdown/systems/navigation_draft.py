@@ -48,7 +48,7 @@ from strapdown.systems.alignment_draft import (
 )
 from strapdown.systems.baseline_angle import baseline_angle
 from strapdown.systems.navigation_checks import finer_than_arm
-from strapdown.systems.navigation_proposal import LOUD, NOISE_KEYS, TAKEN, Proposal, propose
+from strapdown.systems.navigation_proposal import NOISE_KEYS, TAKEN, Proposal, propose
 from strapdown.systems.navigation_source import read_measured
 from strapdown.tables import ACCEL, GEODETIC, GYRO, MAG, POSITION_SD, VELOCITY, VELOCITY_SD
 from strapdown.tables.aiding import HEADING
@@ -602,10 +602,12 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         turns = "the biases as the turns of the whole record allow"
         if set(stated) == {BIAS}:
             why = f"Found: {turns}."
-        elif _shakes(made, name, stated):
+        elif name in made.shaken:
             why = (
-                "Found: it shakes far beyond its noise at rest; half of the time so much, x, y, z:"
+                "Found: it shakes far beyond its noise at rest; over the record, so much may be "
+                "white, x, y, z"
             )
+            why += "; and the gyros drift by it:" if name == "gyro" else ":"
             told.append(f"the {full} shake far beyond their noise while it is quiet")
         elif made.guessed:
             why = (
@@ -644,14 +646,6 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         for key, value in stated.items():
             page.key(key, toml_value(value) or "")
     return told
-
-
-def _shakes(made: Proposal, triad: str, stated: dict[str, Any]) -> bool:
-    """Whether a triad's stated noise is that of shaking, and not of the log while it is quiet."""
-    k, key, unit = next((k, key, u) for k, (name, key, u) in enumerate(NOISE_KEYS) if name == triad)
-    if made.noise is None or key not in stated:
-        return False
-    return bool(max(stated[key]) * unit > LOUD * made.noise[k])
 
 
 def _noisier(made: Proposal, triad: str, stated: dict[str, Any]) -> bool:

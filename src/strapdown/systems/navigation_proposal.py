@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -67,10 +67,17 @@ from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import ORIGIN_STATED, index_of, values_of
 
-#: Windows in which noise is measured, s, and the share taken as the quiet one.
+#: Windows in which noise is measured, s; the share taken as the quiet one, and left out as loudest.
 WINDOW, QUIET = 2.0, 0.05
 #: Ratio to the data-sheet noise beyond which a triad's measured noise is stated instead.
 LOUD = 3.0
+#: Longest average by which noise is measured, s: over longer ones the body moves.
+SLOWEST = 0.16
+#: Shaking that gyros rectify, or that folds down between their samples, drifts: its standard
+#: deviation as a share of that of the samples, and over what time, s. Of 4 deg/s of a car's engine
+#: 0.2 deg/s were seen beside RTK.
+RECTIFIED, SHAKEN = 0.05, 5.0
+DRIFT_KEYS = ("bias_instability_deg_per_h", "random_walk_deg_per_h_per_sqrt_h")
 NOISE_KEYS = (
     ("gyro", "noise_density_deg_per_sqrt_h", math.radians(1.0) / 60.0),
     ("accel", "noise_density_ug_per_sqrt_hz", 1e-6 * STANDARD_GRAVITY),
@@ -199,6 +206,8 @@ class Proposal:
         How long the vehicle is stationary at the start, by all sensors.
     noise : tuple of float, (2,), or None
         Of the gyros in rad/s/√Hz, of the accelerometers in m/s²/√Hz, while it is quiet.
+    shaken : tuple of str
+        Triads whose stated noise is that of vibration.
     guessed : bool
         Whether the sensor is only a grade, by its noise.
     drives : bool
@@ -215,6 +224,7 @@ class Proposal:
     gnss: pd.DataFrame | None
     rest: float
     noise: tuple[float, ...] | None
+    shaken: tuple[str, ...]
     guessed: bool
     drives: bool
     how: str
@@ -289,12 +299,13 @@ def propose(
     quiet = _quiet(imu, until)
     scatter = _scatter(imu)
     # Engine vibration differs between axes; the quietest axis identifies the grade.
-    noise = None if scatter is None else tuple(scatter[0].min(axis=1).tolist())
+    noise = None if scatter is None else tuple(scatter.quiet.min(axis=1).tolist())
     guessed = sensor is None
     sensors: ImuUncertainty | None = None
+    shaken: tuple[str, ...] = ()
     if sensor is not None or scatter is not None:
-        rocking = _rest(quiet, until, rocks=True)
-        table["sensors"] = _sensors(sensor, scatter, _rest_bias(imu, rocking, place, fixes))
+        bias = _rest_bias(imu, _rest(quiet, until, rocks=True), place, fixes)
+        table["sensors"], shaken = _sensors(sensor, scatter, bias)
         sensors = _stated(table)
         if table["sensors"]["sensor"] in SCALED:
             table["states"] = {name: dict(SCALES) for name in ("gyro_scale", "accel_scale")}
@@ -373,7 +384,9 @@ def propose(
                 **clock,
             }
         }
-    return Proposal(table, recording, imu, fixes, rest, noise, guessed, drives, how, findings)
+    return Proposal(
+        table, recording, imu, fixes, rest, noise, shaken, guessed, drives, how, findings
+    )
 
 
 def _fixes(
@@ -445,10 +458,31 @@ def _longer_part(log: LogTable, imu: pd.DataFrame, step: Finding) -> LogTable:
     return log.model_copy(update={"from_s": round(after, 3), "to_s": to, "duration_s": None})
 
 
-def _scatter(imu: pd.DataFrame) -> tuple[Array, Array] | None:
-    """Noise densities, (2, 3), of gyros in rad/s/√Hz and accelerometers in m/s²/√Hz, by axis.
+class Scatter(NamedTuple):
+    """How rates and forces scatter: gyros in rad/s, accelerometers in m/s², (2, 3) by axis.
 
-    While it is quiet, and the median with vibration; None without any, or of a short record.
+    Attributes
+    ----------
+    quiet, loud : ndarray, per √Hz
+        Densities from sample to sample: while it is quiet, and over the record, with vibration.
+    white : ndarray, per √Hz
+        The part of `loud` that may be white: the least density over averages of up to `SLOWEST`.
+    step : float, s
+        Of the samples.
+    """
+
+    quiet: Array
+    loud: Array
+    white: Array
+    step: float
+
+
+def _scatter(imu: pd.DataFrame) -> Scatter | None:
+    """Noise of the sensors and its part by vibration; None without any, or of a short record.
+
+    A spectrum that rises to some frequencies is not that of white noise, whose density is the
+    least of all: the densities are those of Hadamard variances (second differences of means)
+    over 1, 2, 4 … samples.
     """
     time = index_of(imu)
     if ACCEL[0] not in imu.columns or len(time) < 64:
@@ -458,31 +492,44 @@ def _scatter(imu: pd.DataFrame) -> tuple[Array, Array] | None:
     count = len(time) // size
     if count < 3:
         return None
-    quiet, usual = np.empty((2, 2, 3))
+    quiet, loud, white = np.empty((3, 2, 3))
     for k, columns in enumerate((GYRO, ACCEL)):
-        # Second differences remove rotation and acceleration: of white noise they have six times
-        # its variance.
-        second = np.diff(values_of(imu, columns), n=2, axis=0)
-        second = second[: (len(second) // size) * size].reshape(-1, size, 3)
-        sd = np.sqrt(np.square(second).mean(axis=1) / 6.0) * math.sqrt(step)
-        quiet[k], usual[k] = np.quantile(sd, QUIET, axis=0), np.median(sd, axis=0)
-    return (quiet, usual) if quiet.min() > 0.0 else None
+        means, interval = values_of(imu, columns), step
+        for octave in range(1 + max(0, int(math.log2(SLOWEST / step)))):
+            if octave:
+                means = means[: len(means) // 2 * 2].reshape(-1, 2, 3).mean(axis=1)
+                interval *= 2.0
+            # Second differences remove rotation and acceleration: of white noise they have six
+            # times its variance.
+            second = np.diff(means, n=2, axis=0)
+            each = max(8, size >> octave)
+            second = second[: len(second) // each * each].reshape(-1, each, 3)
+            sd = np.sqrt(np.square(second).mean(axis=1) / 6.0) * math.sqrt(interval)
+            # Errors grow by the mean of variances, also of a record that rests most of the time;
+            # without the largest: a door that shuts is no noise of the drive.
+            few = np.sort(sd, axis=0)[: len(sd) - int(QUIET * len(sd))]
+            over = np.sqrt(np.square(few).mean(axis=0))
+            if not octave:
+                quiet[k], loud[k], white[k] = np.quantile(sd, QUIET, axis=0), over, over
+            white[k] = np.minimum(white[k], over)
+    return Scatter(quiet, loud, white, step) if quiet.min() > 0.0 else None
 
 
 def _sensors(
-    named: str | None, scatter: tuple[Array, Array] | None, bias: float | None
-) -> dict[str, Any]:
-    """Sensor to state: the one that is named, or the grade that the noise allows.
+    named: str | None, scatter: Scatter | None, bias: float | None
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Sensor to state: the one that is named, or the grade that the noise allows; shaken triads.
 
-    `scatter`: as of `_scatter`. `bias`: of the gyros by a rest, as of `_rest_bias`. The noise is
-    measured where it exceeds the data sheet's; of a grade it always is.
+    `bias`: of the gyros by a rest, as of `_rest_bias`. The noise is measured where it exceeds the
+    data sheet's; of a grade it always is. Where the body shakes, the gyros drift by it, too, and
+    the drift of the data sheet is a walk of the bias.
     """
     # The figures of a grade are those of all units of all its types.
     out: dict[str, Any] = {"sensor": named, "unit_factor": round(UNIT_FACTOR, 2)}
     if named is None:
         del out["unit_factor"]
         assert scatter is not None
-        noise = float(min(scatter[0][0]))
+        noise = float(min(scatter.quiet[0]))
         out["sensor"] = next(name for name, most in NOISE_OF_GRADES if noise < most)
         if bias is not None and bias < FINEST_BIAS and noise < FINEST_NOISE:
             out["sensor"] = FINEST
@@ -490,22 +537,34 @@ def _sensors(
     # For gyrocompassing gyros the rocking of a vehicle is motion, not noise.
     north = _finds_north(known) or (named is None and bias is not None and bias <= NORTH)
     if scatter is None:
-        return out | ({} if north else _warming(out["sensor"]))
-    for (triad, key, unit), quiet, usual in zip(NOISE_KEYS, *scatter, strict=True):
+        return out | ({} if north else _warming(out["sensor"])), ()
+    shaken: tuple[str, ...] = ()
+    for (triad, key, unit), quiet, loud, white in zip(NOISE_KEYS, *scatter[:3], strict=True):
         sheet = np.asarray(getattr(known, triad).axis("noise_density"))
         stated = quiet if named is None else np.maximum(quiet, sheet)
-        if not north and (usual > LOUD * stated).any():
-            stated = np.maximum(usual, stated)
+        if not north and (loud > LOUD * stated).any():
+            stated, shaken = np.maximum(white, stated), (*shaken, triad)
         if (stated != sheet).any():
             out[triad] = {key: tuple(float(f"{x:.2g}") for x in stated / unit)}
+    drift, factor = known.gyro_drift, 1.0
     largest = max(known.gyro.axis("bias"))
     if named is None and bias is not None and bias < largest:
-        slow = max(known.gyro_drift.triad) * bias / largest * ALLAN_OF_GAUSS_MARKOV
+        factor = bias / largest
+        slow = max(drift.triad) * factor * ALLAN_OF_GAUSS_MARKOV
         out["gyro"] = out.get("gyro", {}) | {
             "bias_sd_deg_per_h": float(f"{bias * DEG_PER_HOUR:.2g}"),
             "bias_instability_deg_per_h": float(f"{slow * DEG_PER_HOUR:.2g}"),
         }
-    return out if north else out | _warming(out["sensor"])
+    if "gyro" in shaken:
+        # Over less than its correlation time the drift of the data sheet is a walk.
+        driven = factor * math.sqrt(2.0 / drift.correlation_time) * np.asarray(drift.triad)
+        walk = 60.0 * np.hypot(driven, drift.steps)
+        drifts = RECTIFIED * ALLAN_OF_GAUSS_MARKOV / math.sqrt(scatter.step) * scatter.loud[0]
+        out["gyro"] |= {
+            key: tuple(float(f"{x * DEG_PER_HOUR:.2g}") for x in size)
+            for key, size in zip(DRIFT_KEYS, (drifts, walk), strict=True)
+        } | {"correlation_time_s": SHAKEN}
+    return (out if north else out | _warming(out["sensor"])), shaken
 
 
 def _warming(named: str) -> dict[str, Any]:
@@ -741,7 +800,8 @@ def clock_offset(fixes: pd.DataFrame, imu: pd.DataFrame, delay: float) -> TimeOf
     scatter, sensors = _scatter(imu), None
     if drives and scatter is not None:
         rest = _rest(_quiet(imu, until), until, rocks=True)
-        sensors = _stated({"sensors": _sensors(None, scatter, _rest_bias(imu, rest, None, fixes))})
+        found, _ = _sensors(None, scatter, _rest_bias(imu, rest, None, fixes))
+        sensors = _stated({"sensors": found})
     antenna = _antenna(_receiver_errors(fixes, imu, delay), delay)
     return receiver_clock(fixes, imu, sensors, antenna)[0]
 

@@ -21,7 +21,10 @@ from strapdown.simulation.vehicles import Accelerate, Stop, Straight, Turn
 from strapdown.systems.navigation_proposal import (
     LOUD,
     NOISE_OF_GRADES,
+    RECTIFIED,
+    Scatter,
     _rest_bias,
+    _scatter,
     _sensors,
     propose,
 )
@@ -37,19 +40,23 @@ RECEIVER = {"rate": 1.0, "position_noise": 0.01, "velocity_noise": 0.03}
 def scatter(gyro, accel, shaken=1.0):
     """Quiet and usual noise of three like axes, as `_scatter` gives them."""
     quiet = np.outer([gyro, accel], np.ones(3))
-    return quiet, shaken * quiet
+    return Scatter(quiet, shaken * quiet, shaken * quiet, 0.01)
+
+
+def sensors(*given):
+    return _sensors(*given)[0]
 
 
 def test_noise_tells_the_grade_and_is_stated():
     gyro, accel = 0.5 * TACTICAL_NOISE, 60.0 / MICRO_G
-    found = _sensors(None, scatter(gyro, accel), None)
+    found = sensors(None, scatter(gyro, accel), None)
     assert found["sensor"] == "tactical-grade"
     assert found["accel"]["noise_density_ug_per_sqrt_hz"] == (60.0, 60.0, 60.0)
     assert np.degrees(gyro) * 60.0 == pytest.approx(
         found["gyro"]["noise_density_deg_per_sqrt_h"][0], rel=0.05
     )
     for noise, grade in ((0.1, "industrial-grade"), (0.168, "consumer-grade")):
-        found = _sensors(None, scatter(np.radians(noise) / 60.0, accel), None)
+        found = sensors(None, scatter(np.radians(noise) / 60.0, accel), None)
         assert found["sensor"] == grade
 
 
@@ -64,23 +71,23 @@ def test_noise_tells_the_grade_and_is_stated():
 )
 def test_a_quiet_unit_whose_rest_shows_no_bias_is_better_than_tactical(noise, bias, grade):
     quiet = scatter(np.radians(noise) / 60.0, 50.0 / MICRO_G)
-    found = _sensors(None, quiet, None if bias is None else bias / DEG_PER_HOUR)
+    found = sensors(None, quiet, None if bias is None else bias / DEG_PER_HOUR)
     assert found["sensor"] == grade
 
 
 def test_noise_beyond_the_data_sheet_is_stated_for_a_named_sensor_too():
     # The HG9900 has accelerometers of 10 µg/√Hz and gyros of 0.002 deg/√h.
     gyro = np.radians(0.001) / 60.0
-    found = _sensors("hg9900", scatter(gyro, 48.0 / MICRO_G), None)
+    found = sensors("hg9900", scatter(gyro, 48.0 / MICRO_G), None)
     assert "gyro" not in found
     assert found["accel"]["noise_density_ug_per_sqrt_hz"] == (48.0, 48.0, 48.0)
 
 
 def test_a_named_unit_may_lie_outside_of_its_type_and_a_grade_has_no_type():
     quiet = scatter(1e-6, 1e-4)
-    assert _sensors("bmi160", quiet, None)["unit_factor"] == round(UNIT_FACTOR, 2)
-    assert _sensors("bmi160", None, None)["unit_factor"] == round(UNIT_FACTOR, 2)
-    assert "unit_factor" not in _sensors(None, quiet, None)
+    assert sensors("bmi160", quiet, None)["unit_factor"] == round(UNIT_FACTOR, 2)
+    assert sensors("bmi160", None, None)["unit_factor"] == round(UNIT_FACTOR, 2)
+    assert "unit_factor" not in sensors(None, quiet, None)
 
 
 def test_the_industrial_grade_is_as_wide_as_the_units_it_stands_for():
@@ -109,25 +116,70 @@ def test_the_intermediate_grade_is_aligned_as_the_navigation_units_are():
 )
 def test_units_of_cheap_grades_are_taken_to_warm_up(named, gyro):
     for quiet in (scatter(1e-6, 1e-4), None):
-        found = _sensors(named, quiet, None).get("warming", {})
+        found = sensors(named, quiet, None).get("warming", {})
         assert found.get("gyro_sd_deg_per_h") == gyro
         assert (found.get("accel_sd_ug", 0.0) > 0.0) == (gyro is not None)
 
 
 def test_gyros_whose_rest_shows_that_they_find_north_are_warm():
     loud = scatter(np.radians(0.1) / 60.0, 1e-4)
-    assert "warming" in _sensors(None, loud, None)
-    assert "warming" not in _sensors(None, loud, 1.0 / DEG_PER_HOUR)
+    assert "warming" in sensors(None, loud, None)
+    assert "warming" not in sensors(None, loud, 1.0 / DEG_PER_HOUR)
 
 
 def test_shaking_is_stated_but_for_gyros_that_find_north():
     gyro, accel, shaken = 0.5 * TACTICAL_NOISE, 60.0 / MICRO_G, 2.0 * LOUD
     key = "noise_density_ug_per_sqrt_hz"
-    found = _sensors(None, scatter(gyro, accel, shaken), None)
+    found = sensors(None, scatter(gyro, accel, shaken), None)
     assert found["accel"][key][0] == pytest.approx(60.0 * shaken)
-    quiet = _sensors(None, scatter(gyro, accel, shaken), 1.0 / DEG_PER_HOUR)
+    quiet = sensors(None, scatter(gyro, accel, shaken), 1.0 / DEG_PER_HOUR)
     assert quiet["accel"][key][0] == pytest.approx(60.0)
     assert quiet["gyro"]["bias_sd_deg_per_h"] == pytest.approx(1.0)
+
+
+def test_of_vibration_only_what_is_white_is_noise_and_gyros_drift_by_the_rest():
+    """A line of 31 Hz, 30 times the noise, was taken as white."""
+    draws, rate, count = np.random.default_rng(20261201), 100.0, 20000
+    time, white = np.arange(count) / rate, np.array([0.05, 0.1])  # deg/s, m/s²
+    line = np.sqrt(2.0) * np.sin(2.0 * np.pi * 31.0 * time)[:, None]
+    loud = (time > 20.0)[:, None]
+    gyro, accel = (
+        size * (draws.normal(size=(count, 3)) + 30.0 * loud * line)
+        for size in np.array([np.radians(white[0]), white[1]])
+    )
+    values = np.hstack([gyro, accel - [0.0, 0.0, 9.8]])
+    imu = pd.DataFrame(values, pd.Index(time, name="time"), [*GYRO, *ACCEL])
+    found = _scatter(imu)
+    density = np.array([np.radians(white[0]), white[1]]) / np.sqrt(rate)
+    # Its second differences are 2 (1 - cos(2 pi 31 / 100)) = 2.74 times the line, of 6; a tenth of
+    # the record is quiet, a twentieth is left out.
+    times = 30.0 * 2.74 / np.sqrt(6.0) * np.sqrt(0.85 / 0.95)
+    assert found.loud / density[:, None] == pytest.approx(times, rel=0.02)
+    # Means of eight samples leave 0.012 of it; their second differences at most four times that.
+    assert (found.white < 1.7 * density[:, None]).all()
+    stated, shaken = _sensors(None, found, None)
+    assert shaken == ("gyro", "accel")
+    # A drift is stated by the least of its Allan deviation, 0.617 of the standard deviation.
+    rms = times * white[0]
+    drift = stated["gyro"]["bias_instability_deg_per_h"]
+    assert drift == pytest.approx(3 * [0.617 * RECTIFIED * rms * 3600.0], rel=0.05)
+    # The drift of the grade is a walk: 30 deg/h over 300 s.
+    walk = 30.0 / 0.617 * np.sqrt(2.0 / 300.0) * 60.0
+    assert stated["gyro"]["random_walk_deg_per_h_per_sqrt_h"] == pytest.approx(3 * [walk], rel=0.05)
+
+
+def test_a_record_that_rests_most_of_the_time_has_the_noise_of_its_drive():
+    """The median was that of the rest, and a drive after it ran without its vibration."""
+    draws, count = np.random.default_rng(20261202), 20000
+    size = np.where(np.arange(count) < 0.7 * count, 1.0, 20.0)[:, None]
+    values = size * draws.normal(size=(count, 6)) * np.repeat([1e-3, 1e-1], 3)
+    found = _scatter(pd.DataFrame(values, pd.Index(0.01 * np.arange(count)), [*GYRO, *ACCEL]))
+    # A twentieth is left out, of the loud 0.3: 0.25 of 0.95.
+    expected = np.sqrt((0.7 + 0.25 * 20.0**2) / 0.95) * np.array([1e-4, 1e-2])
+    assert found.loud == pytest.approx(np.outer(expected, np.ones(3)), rel=0.05)
+    assert found.white == pytest.approx(found.loud, rel=0.2)  # 300 loud means
+    assert found.quiet == pytest.approx(np.outer([1e-4, 1e-2], np.ones(3)), rel=0.15)
+    assert _sensors(None, found, None)[1] == ("gyro", "accel")
 
 
 def test_a_rest_bounds_the_gyro_biases_as_often_as_it_says():
