@@ -24,6 +24,7 @@ from strapdown.formats.clocks import (
     clock_of_name,
     counted,
     even_stamps,
+    is_count,
     read_stamps,
     spread_bursts,
     with_clock,
@@ -43,6 +44,7 @@ from strapdown.formats.find_columns import (
 )
 from strapdown.formats.inference.conclusion import infer_accel, infer_time_unit
 from strapdown.formats.join import join
+from strapdown.formats.known_formats import rows_of_kinds
 from strapdown.formats.recording import (
     AXES_OF_SENSOR,
     Origin,
@@ -86,7 +88,11 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     questions = Questions(raw.name)
     raw = _with_force_of_parts(raw, options)
     found = find_columns(raw, options, questions)
-    if missing := [q for q in GYRO if q not in found]:
+    missing = [q for q in GYRO if q not in found]
+    # Of columns that the user names, the rows may be those of other sensors, too.
+    if (missing or found["gyro_x"].basis in ("option", "open")) and (kinds := rows_of_kinds(raw)):
+        raise kinds
+    if missing:
         raise without_gyro(raw, missing)
     if options.accel_unit is not None and not set(ACCEL) & set(found):
         _refuse_unit_of_nothing(raw, found, options.accel_unit)
@@ -156,7 +162,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         elif code == "io.time-unit-undecided" and choices:
             best = choices[0].data
             unit = str(best["unit"]) if best["share"] >= LIKELY else "UNIT"
-            questions.ask(error.finding, time_unit=unit)
+            counts = any(c.code == "io.choice-of-count" for c in choices)
+            questions.ask(error.finding, **({"rate": "HZ"} if counts else {"time_unit": unit}))
         elif code == "io.time-unit-named-too-fast":
             questions.ask(error.finding, time_unit=str(error.finding.data["likely"]))
         elif code == "io.time-column-missing":
@@ -730,6 +737,11 @@ def _stamps_of_log(
         everything = np.ones(rows.size, dtype=bool)
         return Stamps(rows / rate, "s", why, everything, Origin(0, "s"), [])
     column, inferred = log.found["time"], log.said.get("time_unit")
+    open_unit = column.unit is None and column.basis != "file" and not (dated or options.time_unit)
+    if rate is not None and open_unit and is_count(ticks):
+        log.note("io.time-from-counter", "time", source=column.source, rate=rate, lost=0)
+        why = f"samples as numbered by {column.source!r}, {rate:g} Hz as stated"
+        return read_stamps((ticks if rows is None else ticks[rows]) / rate, "s", why, **where)
     if options.rate is not None:
         log.note("io.rate-not-used", "time", rate=options.rate, source=column.source)
     unit, why = column.unit, "in its name"
@@ -896,6 +908,8 @@ def _report_beyond_limits(
 # Half of a log of a body that is carried, driven or flown has more force than this: only a fall
 # has less.
 WEIGHTLESS = 0.3 * STANDARD_GRAVITY  # m/s²
+# And more than this for so long only on a centrifuge.
+HEAVY = 4.0 * STANDARD_GRAVITY  # m/s²
 #: Rows, spread evenly over a log, of which this is judged.
 SOME = 100_000
 
@@ -925,7 +939,7 @@ def _report_constant(log: LogInUse, body: Mapping[str, Array], axis: Sequence[in
 
 
 def _report_weightless(log: LogInUse, accel: Array | None) -> None:
-    """Report a specific force too small for gravity, which the numbers left open without a unit."""
+    """Report a specific force too small or too large for that of gravity, as of a wrong unit."""
     if accel is None or any(f.code == "io.no-gravity" for f in log.findings):
         return
     some = np.empty((len(range(0, len(accel), 1 + len(accel) // SOME)), 3))
@@ -937,6 +951,8 @@ def _report_weightless(log: LogInUse, accel: Array | None) -> None:
     if usual < WEIGHTLESS:
         reason = Finding("io.evidence-force-too-small", severity="note", usual=usual)
         log.warn("io.no-gravity", "accel", reason=reason)
+    elif usual > HEAVY:
+        log.warn("io.force-absurd-for-long", "accel", usual=usual, ratio=usual / STANDARD_GRAVITY)
 
 
 def _finite_rows(log: LogInUse, ticks: NDArray[Any] | None) -> NDArray[np.bool_]:

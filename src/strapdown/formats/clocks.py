@@ -300,6 +300,14 @@ def counted(columns: Mapping[str, NDArray[Any]]) -> tuple[str, NDArray[np.int64]
     return None
 
 
+def is_count(stamps: NDArray[Any]) -> bool:
+    """Whether stamps are whole numbers of which each is that before plus one.
+
+    They number the samples as well as they are a clock of one tick a sample.
+    """
+    return stamps.dtype.kind in "iu" and stamps.size > 1 and bool((np.diff(stamps) == 1).all())
+
+
 # Stamps that are coarser than the samples.
 
 
@@ -748,6 +756,8 @@ def _evident_unit(
         for u in (*TICKS, "s/32768")
         if usual > 0 and 5.0 <= (rate := 1.0 / (usual * factor_of(u, TIME_UNITS))) <= 2e3
     ]
+    if is_count(stamps):
+        choices.append(Finding("io.choice-of-count", severity="note"))
     raise DataError(
         "io.time-unit-undecided" if choices else "io.time-unit-of-no-step",
         file=file,

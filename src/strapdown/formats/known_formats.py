@@ -123,6 +123,8 @@ _OF_SENSORS = {
     *("i", "id", "instance", "imu", "imuid", "sensor", "sensorid", "sensorindex", "sensornumber"),
     *("device", "deviceid", "devicename", "unit", "unitid", "node", "nodeid", "board", "address"),
 }
+#: And of one that says the kind of a row's sensor.
+_OF_KINDS = {"sensortype", "typeofsensor", "kind", "type", "attribute"}
 #: Most sensors of a table, fewest rows of each, and the share of the rows after which another
 #: follows: a number that changes less often is a state.
 MOST_SENSORS, FEWEST, CHANGES = 16, 10, 0.1
@@ -158,19 +160,7 @@ def of_one_sensor(raw: RawLog) -> RawLog:
     """Keep the rows of the first of several sensors, with a warning; the same log if it has one."""
     if all(read_name(name).quantity != "gyro_x" for name in raw.columns):
         return raw
-    for name, values in raw.columns.items():
-        if (
-            re.sub(r"[^a-z0-9]", "", name.lower()) not in _OF_SENSORS
-            or values.dtype.kind not in "iuO"
-        ):
-            continue
-        texts = values.astype(str)
-        sensors, counts = np.unique(texts, return_counts=True)
-        changes = np.count_nonzero(texts[1:] != texts[:-1])
-        if not 1 < sensors.size <= MOST_SENSORS or counts.min() < FEWEST:
-            continue
-        if changes < CHANGES * texts.size or not _in_turns(texts):
-            continue
+    for name, texts, counts in _in_turn_by(raw, _OF_SENSORS):
         if not _all_have_rates(raw, texts):
             continue
         first = str(texts[0])
@@ -179,14 +169,39 @@ def of_one_sensor(raw: RawLog) -> RawLog:
             severity="warning",
             file=raw.name,
             name=name,
-            count=int(sensors.size),
-            sensors=[f"{s} ({n} rows)" for s, n in zip(sensors, counts, strict=True)],
+            count=len(counts),
+            sensors=[f"{s} ({n} rows)" for s, n in counts.items()],
             first=first,
         )
         raw = selected(raw, texts == first)
         raw.findings.append(finding)
         return raw
     return raw
+
+
+def rows_of_kinds(raw: RawLog) -> DataError | None:
+    """Make the error for rows of sensors of several kinds in turn; none if there are no such."""
+    for name, _, counts in _in_turn_by(raw, _OF_SENSORS | _OF_KINDS):
+        kinds = [f"{kind} ({n} rows)" for kind, n in counts.items()]
+        return raw.fault("io.rows-of-kinds", name=name, kinds=kinds)
+    return None
+
+
+def _in_turn_by(
+    raw: RawLog, words: set[str]
+) -> Iterator[tuple[str, NDArray[np.str_], dict[str, int]]]:
+    """Yield columns whose values tell sensors apart that are read in turns, with their counts."""
+    for name, values in raw.columns.items():
+        plain = re.sub(r"[^a-z0-9]", "", name.lower())
+        if plain not in words or values.dtype.kind not in "iuO":
+            continue
+        texts = values.astype(str)
+        sensors, counts = np.unique(texts, return_counts=True)
+        changes = np.count_nonzero(texts[1:] != texts[:-1])
+        if not 1 < sensors.size <= MOST_SENSORS or counts.min() < FEWEST:
+            continue
+        if changes >= CHANGES * texts.size and _in_turns(texts):
+            yield name, texts, dict(zip(map(str, sensors), map(int, counts), strict=True))
 
 
 # Sensors of phones, each with the sign of its phone.
