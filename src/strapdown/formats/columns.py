@@ -47,6 +47,10 @@ from strapdown.formats.vocabularies import (
 from strapdown.units import ACCEL_UNITS, FACTORS, OF_LOGS, find_unit, unit_of, unit_words
 
 _AXES = "xyz"
+#: Axes with a letter of the body or the vehicle: AngleRate Xv of OXTS.
+#: Axes of the body about which its angles turn: Yaw (deg/s) is a rate.
+_TURN_OF = {"roll": "x", "pitch": "y", "heading": "z"}
+_FRAMED = {f"{axis}{frame}": axis for axis in _AXES for frame in "bv"}
 #: A column of an array: its name and its number.
 INDEXED = re.compile(r"(.*)\[(\d+)\]")
 # Word to the axis of the body and its sign.
@@ -146,9 +150,13 @@ def read_name(name: str, of: Vocabulary = LOGS, unit: str = "") -> ColumnName:
 def _read_name(name: str, of: Vocabulary, unit: str) -> ColumnName:
     text, index = unicodedata.normalize("NFC", name).strip(), ""
     if match := INDEXED.fullmatch(text):
-        if not of.sensors:
-            return ColumnName(None)  # q[0] is a part of an array, not a column q in units of 0
         text, index = match.groups()
+        if not of.sensors:
+            # q[0] is a part of an array, not a column q in units of 0.
+            part = _FIX_OF_BLACKBOX.get(index) if text.lower() == "gps_coord" else None
+            return ColumnName(part if part in of.quantities else None)
+        if _DEMANDED.fullmatch(text):
+            return ColumnName(None)
     if of.stems and (code := _of_code(text, unit)) is not None:
         return code
     if not of.sensors and len(text) <= LONGEST:
@@ -172,6 +180,9 @@ def _read_name(name: str, of: Vocabulary, unit: str) -> ColumnName:
     return _of_heading(bare, written or unit, said, of) if of.stems else said
 
 
+#: Of the blackbox of flight controllers: the rate that is demanded, and the position of the fix.
+_DEMANDED = re.compile(r"axis_?rate", re.I)
+_FIX_OF_BLACKBOX = {"0": "lat", "1": "lon"}
 #: Names of up to so many letters are kept with their meaning: a table asks for each several times.
 LONGEST = 100
 #: Longer names have no meaning: those of a damaged file, in which searching takes minutes.
@@ -284,6 +295,8 @@ def _read(bare: str, written: str, of: Vocabulary) -> ColumnName:
         # A temperature or an angle is not a clock; a text in brackets may be anything: time (of
         # day).
         said = replace(said, quantity=None if of.sensors or kind else quantity)
+    elif of.sensors and quantity in _TURN_OF and kind and kind[0] == "rate":
+        return replace(said, quantity=f"gyro_{_TURN_OF[str(quantity)]}", loose=2, family="turn")
     elif of.sensors and quantity in QUANTITIES[1:] and kind and kind[0] == "time":
         return ColumnName(None, said.unit)  # gyro_x_min
     if written and unit is None and not of.sensors and written.lower() not in OF_TIME:
@@ -363,7 +376,7 @@ def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> Col
             return ColumnName("time" if clock else None, unit, loose=2)
         return replace(said, unit=unit or said.unit, loose=2)
     bare = [part for w in words if not _is_model(w) for part in re.findall(r"\D+|\d+", w)]
-    bare = [w for w in bare if w not in NOISE]
+    bare = [_FRAMED.get(w, w) for w in bare if w not in NOISE]
     axes = [k for k, w in enumerate(bare) if w in _AXES]
     force = [k for k in range(len(bare) - 1) if bare[k : k + 2] == ["g", "force"]]
     for k in force:

@@ -357,7 +357,7 @@ def stated_units(above: list[str], columns: dict[str, NDArray[Any]]) -> dict[str
             unit = _counts(triad, rest, bool(_16_BIT.search(text)))
             if unit is not None and not _are_counts(triad, columns):
                 continue
-            said = unit_of(m[1].strip(".:")) if (m := _IN.match(rest)) else None
+            said = unit_of(m[1].strip(".:").removesuffix("'s")) if (m := _IN.match(rest)) else None
             if unit or said in _KNOWN[triad]:
                 out[triad] = unit or str(said)
     return out

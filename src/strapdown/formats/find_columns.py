@@ -193,13 +193,18 @@ def names_of_quantities(raw: RawLog) -> set[str]:
 def without_gyro(raw: RawLog, missing: list[str]) -> DataError:
     """Make the error for a log without three rates; the message lists its columns."""
     if _is_nameless(raw):
-        return DataError(_nameless(raw, {}))
+        return _of_empatica(raw) or DataError(_nameless(raw, {}))
     said = {
         name: raw.stated[name][0] if name in raw.stated else str(read_name(name).quantity)
         for name in raw.columns
     }
     force = [n for n, q in said.items() if q.startswith("accel_")]
+    if [*raw.triad_units] == ["accel"] and {*AXES} <= {n.strip().lower() for n in said}:
+        force = [n for n in said if n.strip().lower() in {*AXES}]  # said above the table
+        said |= {n: f"accel_{n.strip().lower()}" for n in force}
     force = force if {said[n][-1] for n in force} == set(AXES) else _letters_of_g(raw, said)
+    if not force and len(words := [n for n in said if _OF_FORCES.search(n)]) == len(AXES):
+        force = words  # of axes in words: Accelerometer (up/down)
     # The letter g alone is as often a force.
     other = [n for n in said if n not in force and read_name(n).family not in ("g", "g#")]
     if force and not any(said[n].startswith("gyro") or _OF_RATES.search(n) for n in other):
@@ -216,9 +221,28 @@ def without_gyro(raw: RawLog, missing: list[str]) -> DataError:
 
 #: Words of a rate of turn, in names that are not understood.
 _OF_RATES = re.compile(
-    r"gyr|angul|ang[\W_]?(?:vel|rate)|rotat|(?<![a-z])rates?(?![a-z])|omega|ω|dps|(?:deg|rad|°)/s",
+    r"gyr|angul|ang[\W_]?(?:vel|rate)|rotat|(?<![a-z])(?<!heart[\W_])rates?(?![a-z])|omega|ω|dps|(?:deg|rad|°)/s",
     re.I,
 )
+
+
+#: An accelerometer, in names whose axes are not understood.
+_OF_FORCES = re.compile(r"accelerometer|acceleration", re.I)
+#: Seconds since 1970 of a start, and largest rate, in the rows of Empatica.
+STARTS, MOST_RATE = (1e9, 4e9), 1e3
+
+
+def _of_empatica(raw: RawLog) -> DataError | None:
+    """Make the error for a table whose first two rows are its start and its rate."""
+    columns = list(raw.columns.values())
+    if any(c.dtype.kind not in "iuf" or c.size < 3 for c in columns):
+        return None
+    start, rate = (np.array([float(c[k]) for c in columns]) for k in (0, 1))
+    if np.ptp(start) or np.ptp(rate) or not STARTS[0] < start[0] < STARTS[1]:
+        return None
+    if not 0.0 < rate[0] <= MOST_RATE:
+        return None
+    return raw.fault("io.of-empatica", start=start[0], rate=rate[0])
 
 
 def _letters_of_g(raw: RawLog, said: Mapping[str, str]) -> list[str]:
@@ -226,6 +250,28 @@ def _letters_of_g(raw: RawLog, said: Mapping[str, str]) -> list[str]:
     three = [n for a in AXES for n, q in said.items() if q == f"gyro_{a}"]
     whole = len(three) == len(AXES) and all(read_name(n).family == "g" for n in three)
     return three if whole and _shows_gravity(raw, three) else []
+
+
+#: Least share of the changes of a triad that another one's explain, if it is a copy of it.
+COPIED = 0.8
+
+
+def _follows(raw: RawLog, names: list[str], others: list[str]) -> bool:
+    """Whether three columns change as three others do, in another scale: rates and forces do not.
+
+    The constants alone, of a turn about the vertical, show nothing.
+    """
+    three, other = ([raw.columns[n] for n in some] for some in (names, others))
+    if any(c.dtype.kind not in "iuf" for c in (*three, *other)):
+        return False
+    a, b = (np.column_stack(some).astype(np.float64) for some in (three, other))
+    fine = np.isfinite(a).all(axis=1) & np.isfinite(b).all(axis=1)
+    if not fine.any():
+        return False
+    a, b = (x[fine] - x[fine].mean(axis=0) for x in (a, b))
+    size = float((a * a).sum()) * float((b * b).sum())
+    both = float((a * b).sum())
+    return size > 0.0 < both and both * both > COPIED * size
 
 
 def _is_nameless(raw: RawLog) -> bool:
@@ -257,12 +303,13 @@ def _nameless(raw: RawLog, likely: dict[str, str]) -> Finding:
 def _in_usual_order(raw: RawLog) -> dict[str, str]:
     """Number the columns as many logs have them: a clock, which no words are, rates, forces."""
     kinds = [column.dtype.kind for column in raw.columns.values()]
-    out = {"time": "1"} if kinds[0] in "iufM" else {}
+    out = {"time": "1"} if kinds[0] in "iufM" and len(kinds) > len(AXES) else {}
     words = next((k for k, kind in enumerate(kinds) if kind in "iuf"), 0)
-    first = 2 if out else words + 1
+    first = 2 if out else words + 1 if kinds[0] not in "iufM" else 1
     triads = ("gyro", "accel") if len(kinds) >= first + 5 else ("gyro",)
     quantities = [f"{triad}_{axis}" for triad in triads for axis in AXES]
-    return out | {quantity: str(k) for k, quantity in enumerate(quantities, first)}
+    numbered = zip(quantities, range(first, len(kinds) + 1), strict=False)
+    return out | {quantity: str(k) for quantity, k in numbered}
 
 
 #: Ranges of the median norm of an accelerometer in m/s², g and mg, and most of its spread between
@@ -538,6 +585,8 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
             f: m for f, m in kept.items() if next(iter(m.values())).rpartition("/")[0] in inside
         }
         kept = of_unit or kept
+        # Of a simulation, the sensor rather than its truth.
+        kept = dict(sorted(kept.items(), key=lambda one: not _of_imu(one[1])))
         first = next(iter(kept.values()))
         members = {f"{triad}_{axis}": name for axis, name in first.items()}
         found |= {q: name for q, name in members.items() if q not in wanted}
@@ -582,11 +631,17 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
             continue
         # Names read without their order are a last resort.
         names = [n for n in names if not said[n].loose] or names
+        if len(names) > 1 and quantity == "time":
+            names = _one_clock(raw, names)
         found[quantity] = names[0]
         if len(names) > 1:
             questions.ask(
                 _several(raw, quantity, names, names[0]), **{quantity: reference(raw, names[0])}
             )
+    plain = {name.strip().lower(): name for name in raw.columns}
+    if len(raw.triad_units) == 1 and {*AXES} <= plain.keys() and not {*found, *wanted} - {"time"}:
+        # The one sensor of which the lines above the table speak.
+        found |= {f"{t}_{a}": plain[a] for t in raw.triad_units for a in AXES}
     if "time" not in {*found, *wanted} and (clock := clock_by_values(raw)):
         found["time"] = clock
     return {q: Column(name, unit_stated(raw, name), "name") for q, name in found.items()}
@@ -687,6 +742,11 @@ def _letter_g(
     alone = not (rates or linear or units - {None})
     said = {n: f"gyro_{a}" for a, n in own.items()}
     gravity = alone and bool(_letters_of_g(raw, said))
+    # Torque has the whole force as G(x) beside one of another name.
+    beside = [] if rates or units - {None} else _letters_of_g(raw, said)
+    if beside and len(whole) == len(AXES) and _follows(raw, beside, whole):
+        del families["gyro", "g"]
+        return
     if not rates and (whole or not linear) and not (gravity or units <= set(ACCEL_UNITS)):
         return
     del families["gyro", "g"]
@@ -701,6 +761,11 @@ def _letter_g(
         Finding("io.letter-g-open", file=raw.name, quantity=triad, names=names, triad=triad),
         **_answer(raw, triad, own),
     )
+
+
+def _of_imu(family: Family) -> bool:
+    """Whether the names of a sensor begin with the word for its unit."""
+    return next(iter(family.values())).lower().startswith("imu")
 
 
 def _several(raw: RawLog, quantity: str, names: list[str], first: str) -> Finding:
@@ -1016,6 +1081,10 @@ def _factor(quantity: str, known: Quantity, unit: str | None, name: str, file: s
     return known.units[unit]
 
 
+#: In the name of a clock that other recordings have, too.
+_SINCE_1970 = re.compile(r"utc|unix|epoch|gps", re.I)
+
+
 def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
     """Find the columns of fixes: as asked, else as the file states, else by their names.
 
@@ -1035,6 +1104,10 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
             # A lone T is as often a temperature; a text that is not a stamp is not a clock.
             other = {n for n in clocks if n == "T" or not is_clock(raw, n)} - set(asked.values())
             names = [n for n in names if n not in other or other >= set(clocks)]
+            left = sorted(set(clocks) & {*names}, key=lambda n: not _SINCE_1970.search(n))
+            if len(left) > 1 and "time" not in asked and len(one := _one_clock(raw, left)) == 1:
+                # Beside a clock since the start, that of the receiver.
+                names = [n for n in names if n not in left or n in one]
         by_name = find_quantities(names, FIXES, asked, raw.name, raw.units)
         if "time" not in by_name and (clock := clock_by_values(raw)):
             by_name["time"] = Found(clock, 1.0, False)

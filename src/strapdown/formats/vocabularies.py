@@ -162,7 +162,8 @@ APPLE = ("timeintervalsince1970",)
 OF_TIME = {
     *_words("time timestamp timestamps stamp unix epoch utc gps system gmt sample logging elapsed"),
     *_words(
-        "since since1970 start startup boot reboot local ros rosbag bag header rtc chip device lsl"
+        "since since1970 start startup boot reboot local ros rosbag bag header rtc chip device lsl "
+        "host esp mcu arduino unified session phone monotonic relative received recorded arrival"
     ),
 }
 TIME = Quantity((*TIMES, *CLOCKS), TIME_UNITS)
@@ -175,7 +176,7 @@ DATED = Quantity((*TIME.words, "date"), TIME_UNITS)
 
 _TRIAD_WORDS = {
     "gyro": "gyro gyros gyr gyroscope gyroscopes imugyr imugyro angularvelocity angularvel angvel "
-    "velocityangular rotationvelocity velocityrotation "
+    "velocityangular rotationvelocity velocityrotation anglerate "
     "angularrate angularrates angrate angularspeed turnrate rot rotationrate rotrate omega rate "
     "av w g ω avel pqr bodyrate bodyrates wb wib wibb omegab omegaib omegaibb",
     "accel": "accel acce acc accelerometer accelerometers accelerations acceleration accl "
@@ -192,7 +193,7 @@ SUMMED = {
     "accel": ["dv", "deltav", "dvel", "deltavel", "deltavelocity", "velocityincrement"],
 }
 #: Gravity by itself, as phones write it beside acceleration without it.
-GRAVITY = ("gravity", "grav", "gvec")
+GRAVITY = ("gravity", "grav", "gra", "gvec")
 # A name that is a unit says the sensor: dps_x, uT_x. The letter g may be anything.
 NAMED_BY_UNIT = {
     **dict.fromkeys(("dps", "mdps", "rads", "degs"), "gyro"),
@@ -242,7 +243,8 @@ NOISE = {
     *("unbiased",),
     # Of flight controllers: converted, smoothed (gyroADC, accSmooth).
     *("adc", "smooth", "filt", "filtered", "lpf", "lowpass", "out", "scaled", "total", "inertial"),
-    *("uncomp", "uncompensated", "comp", "compensated", "ch", "channel", "sens", "mpu", "type"),
+    *("un", "uncomp", "uncompensated", "comp", "compensated", "ch", "channel", "sens", "mpu"),
+    "type",
     # Counts, and revolutions or radians per second: the values say which.
     *("lsb", "rps", "轴", "軸", "축", "ось", "оси"),
 }
