@@ -147,7 +147,9 @@ def _layout(text: str) -> tuple[int, int, int, str | None, dict[str, str]] | Non
         advances = all(_STAMP.fullmatch(r[stamp]) for r in body) and _advance(
             [float(r[stamp]) for r in body]
         )
-        if usual and advances and len(kinds) > 1:
+        # A file of one sensor may say it in every row.
+        alone = kinds == {"gyro"} and len(fields) == 1 and not min(fields).isdecimal()
+        if usual and advances and (len(kinds) > 1 or (alone and header)):
             if any(field.isdecimal() and kind_of(field) for field in fields):
                 named = not header or _HEADED.fullmatch(header[kind])
                 signed = any(field.startswith("-") for field in fields)

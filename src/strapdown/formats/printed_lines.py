@@ -70,6 +70,7 @@ def as_rows(numbered: Lines) -> Lines:
 
     The same object if there are none.
     """
+    numbered = _channels_named(numbered)
     top = numbered[:SEARCHED]
     if any(_TYPE.search(line) for _, line in top if len(line) < LONGEST):
         numbered = [(row, _TYPE.sub(r"\1", line)) for row, line in numbered]
@@ -83,7 +84,13 @@ def as_rows(numbered: Lines) -> Lines:
         numbered = [(row, SENTENCE.sub(r"\1\2", line)) for row, line in numbered]
         numbered = with_names(numbered, sentences.pop())
         top = numbered[:SEARCHED]
-    tags = {m[1] if m else "" for m in (_TAGGED.match(line) for _, line in top)}
+    # Names may stand under the word, too.
+    named = bool(top) and re.match(r"\s*([A-Za-z]\w*):[ \t]*[A-Za-z]", top[0][1])
+    rest = top[1:] if named else top
+    tags = {m[1] if m else "" for m in (_TAGGED.match(line) for _, line in rest)}
+    if named and tags == {named[1]} and "," in top[0][1]:
+        numbered = [(row, line.replace(f"{named[1]}:", "", 1)) for row, line in numbered]
+        top, tags = numbered[:SEARCHED], set()
     if len(tags) == 1 and "" not in tags:
         # Three numbers are a vector of that name.
         between = separator_of(top[0][1])
@@ -103,6 +110,26 @@ def as_rows(numbered: Lines) -> Lines:
     parted = [_printed(line) for _, line in top]
     joined = _one_line_a_sample(numbered, [texts for texts, _ in parted])
     return _unlabelled(joined, parted if joined is numbered else None)
+
+
+#: A channel in the first line of RaceCapture: "AccelX"|"G"|-3.0|3.0|25.
+_CHANNEL = re.compile(r'"([^"|,]+)"\|"([^"|,]*)"(?:\|[^"|,]*)*')
+
+
+def _channels_named(numbered: Lines) -> Lines:
+    """Name the channels of a first line that has their ranges and rates, too, with their units.
+
+    ``Interval`` counts since power was switched on. The same object if there are none.
+    """
+    first = numbered[0][1].strip() if numbered else ""
+    if '"|"' not in first:
+        return numbered
+    channels = [_CHANNEL.fullmatch(cell.strip()) for cell in first.split(",")]
+    if len(channels) < LABELS or None in channels:
+        return numbered
+    said = [(m[1].replace("Interval", "time"), m[2]) for m in channels if m]
+    names = [f"{name} [{unit}]" if unit else name for name, unit in said]
+    return [(numbered[0][0], ",".join(names)), *numbered[1:]]
 
 
 def _with_arrival(line: str, stamp: str | None) -> str:
@@ -164,7 +191,8 @@ def _unlabelled(numbered: Lines, top: list[Printed] | None = None) -> Lines:
     """
     top = top or [_printed(line) for _, line in numbered[:SEARCHED]]
     usual = Counter(texts for texts, values in top if len(values) >= LABELS).most_common(1)
-    if not usual or 2 * usual[0][1] <= len(top):
+    # Sentences between them have no numbers.
+    if not usual or 2 * usual[0][1] <= sum(bool(values) for _, values in top):
         return numbered
     texts = usual[0][0]
     names = _names(texts, [values for said, values in top if said == texts])
@@ -209,8 +237,11 @@ def _names(texts: tuple[str, ...], rows: list[list[str]]) -> list[str] | None:
     for run in [*runs, [len(texts) - 1]]:
         unit, label, base = _label(texts[run[0]], bases[-1])
         # The unit behind the last axis of a name is that of all.
+        last = read_name(said[-1][0]) if said else read_name("")
         for k in reversed(range(len(said) if unit else 0)):
-            if said[k][1] or bases[k + 1] != bases[-1]:
+            # ax, ay and az are of one sensor, too.
+            family = last.family and read_name(said[k][0]).family == last.family
+            if said[k][1] or not (bases[k + 1] == bases[-1] or family):
                 break
             said[k] = (said[k][0], unit)
         # 0,12 may be a number with a decimal comma.

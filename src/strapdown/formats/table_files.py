@@ -193,9 +193,12 @@ def _form(text: str) -> str:
     Impulse has them (data acquisition format), ``"sensors": [{"name": "accX", "units": "m/s2"}, …],
     "values": [[…], …]``. ``columns``: members of an object, ``{"time": [0.0, …``, or as pandas
     writes a table. ``member``: objects in the first list of an object, ``{"locations": [{…``.
-    ``nested``: columns, or rows under a list of names, in an object in an object.
+    ``nested``: columns, or rows under a list of names, in an object in an object. ``streams``: a
+    list of each as its ``data``.
     """
     value, end = json_beginning(text)
+    if _data_of(value):
+        return "streams"
     if isinstance(value, list):
         first = value[0] if value else None
         return "objects" if isinstance(first, dict) else "rows" if _begins_plain(first) else ""
@@ -228,6 +231,33 @@ def _form(text: str) -> str:
     return "nested"
 
 
+#: Words for a position of two numbers, as a stream of Strava has them.
+_PAIRS = {"latlng", "latlon"}
+
+
+def _data_of(content: Any) -> dict[str, list[Any]]:
+    """Return the columns of objects that have one each as ``data``; empty if they do not.
+
+    ``{"time": {"data": […], "series_type": …}, "latlng": {"data": [[…, …], …]}}`` or a list of
+    such objects with their ``type``, as Strava has the streams of an activity.
+    """
+    held = content
+    if isinstance(held, list):
+        held = {str(one.get("type")): one for one in held if isinstance(one, dict)}
+    if not isinstance(held, dict) or not all(isinstance(one, dict) for one in held.values()):
+        return {}
+    out: dict[str, list[Any]] = {}
+    for name, one in held.items():
+        values = one.get("data")
+        if not _begins_plain(values):
+            return {}
+        if name.lower() in _PAIRS and all(isinstance(v, list) and len(v) == 2 for v in values):
+            out |= {n: [v[k] for v in values] for k, n in enumerate(("lat", "lon"))}
+        else:
+            out[name] = values
+    return out
+
+
 def _is_part(value: Any) -> bool:
     return isinstance(value, dict | list)
 
@@ -245,7 +275,7 @@ def _begins(path: Path) -> bool:
     form = _form(text)
     if path.suffix.lower() in JSON_SUFFIXES[:1] and form in ("objects", "rows", "nested"):
         return True
-    if form in ("apart", "member", "columns"):
+    if form in ("apart", "member", "columns", "streams"):
         return True
     value, end = json_beginning(text)
     return isinstance(value, dict) and end > 0 and "\n" not in text[:end]
@@ -261,6 +291,8 @@ def read_json_table(path: Path) -> RawLog:
         return _names_apart(path)
     if form in ("columns", "rows"):
         return _by_columns(path)
+    if form == "streams":
+        return _of_columns(path, _data_of(from_json(path)))
     if form in ("member", "nested"):
         whole = from_json(path)
         content = _unwrapped(whole)
