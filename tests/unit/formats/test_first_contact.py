@@ -23,7 +23,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError
 from strapdown.formats import printed_lines, reader_of
 from strapdown.formats.arrays import nanoseconds_of
-from strapdown.formats.columns import read_name
+from strapdown.formats.columns import UNKNOWN_WORDS, read_name
 from strapdown.formats.csv import of_arrays
 from strapdown.formats.find_columns import rates_and_force
 from strapdown.formats.novatel import SCALES
@@ -1125,3 +1125,257 @@ def test_a_quaternion_among_columns_without_names_is_no_force():
     columns = [T, *q.T, *TURN.as_euler("xyz").T, *RATE.T, *FORCE.T]
     assert rates_and_force(columns) == (8, 11)
     assert rates_and_force([*q.T, *RATE.T]) is None
+
+
+# Logs of strangers: whose numbers were taken for others, or whose plain words were not understood.
+
+
+SIX = [f"{s}_{a}" for s in ("gyro", "acc") for a in "xyz"]
+
+
+def samples(k, rate=1.0, force=1.0, digits=6):
+    return [*many(RATE[k] * rate, digits), *many(FORCE[k] * force, digits)]
+
+
+def test_a_clock_that_steps_by_one_may_number_the_samples(tmp_path):
+    """The stated rate was ignored, and 1000 Hz proposed."""
+    rows = [line("Timestamp", *(f"{n}_rad_s" if n[0] == "g" else f"{n}_mps2" for n in SIX))]
+    rows += [line(k, *samples(k)) for k in range(250)]
+    path = written(tmp_path, "log.csv", rows)
+    with pytest.raises(DataError, check=coded("io.time-unit-undecided")) as refused:
+        sd.read_imu(path)
+    assert refused.value.finding.data["flags"] == "--rate HZ"
+    imu = sd.read_imu(path, rate_hz=100.0)
+    check(imu, RATE[:250], FORCE[:250])
+    assert "io.time-from-counter" in {f.code for f in imu.findings}
+
+
+def test_a_specific_force_of_many_g_for_long_has_another_unit(tmp_path):
+    rows = [line("time_s", *(f"{n}_dps" if n[0] == "g" else f"{n}_g" for n in SIX))]
+    rows += [line(f"{T[k]:.3f}", *samples(k, DEG, 5.0 / STANDARD_GRAVITY)) for k in range(N)]
+    imu = sd.read_imu(written(tmp_path, "log.csv", rows))
+    (said,) = [f for f in imu.findings if f.code == "io.force-absurd-for-long"]
+    assert (said.severity, said.quantity) == ("warning", "accel")
+    assert said.data["ratio"] == pytest.approx(5.0, rel=0.01)
+
+
+@pytest.mark.parametrize("columns", [{}, {f"gyro_{a}": f"{a.upper()}-Axis" for a in "xyz"}])
+def test_rows_of_sensors_of_several_kinds_are_not_mixed(tmp_path, columns):
+    """UMAFall: under three names of axes stand rows of each sensor, told apart by its number."""
+    rows = ["TimeStamp;Sample No;X-Axis;Y-Axis;Z-Axis;Sensor Type;Sensor ID"]
+    for k in range(N):
+        for kind, three in ((0, FORCE[k] / STANDARD_GRAVITY), (1, RATE[k] * DEG)):
+            rows.append(line(f"{1e3 * T[k]:.0f}", k, *many(three), kind, 3, separator=";"))
+    with pytest.raises(DataError, check=coded("io.rows-of-kinds")) as refused:
+        sd.read_imu(written(tmp_path, "walk.csv", rows), columns=columns, units={"gyro": "deg/s"})
+    data = refused.value.finding.data
+    assert (data["name"], data["kinds"]) == ("Sensor Type", (f"0 ({N} rows)", f"1 ({N} rows)"))
+
+
+def test_a_copy_of_the_force_under_the_letter_g_is_no_gyro(tmp_path):
+    """Torque: G(x) has the whole force beside that of a sensor; it was asked for as a rate."""
+    names = [f"Acceleration Sensor({a} axis)(g)" for a in "XYZ"]
+    rows = [line(" Device Time", " G(x)", " G(y)", " G(z)", *names)]
+    for k in range(N):
+        stamp = f"{DAY + timedelta(seconds=float(T[k])):%d-%b-%Y %H:%M:%S.%f}"[:-3]
+        rows.append(line(stamp, *many(FORCE[k], 4), *many(FORCE[k] / STANDARD_GRAVITY, 4)))
+    path = written(tmp_path, "trackLog.csv", rows)
+    with pytest.raises(DataError, check=coded("io.accelerometer-alone")):
+        sd.read_imu(path)
+    # Rates under that letter are rates, of a turn at 10 deg/s about the vertical, too.
+    noise = np.random.default_rng(4).normal(0.0, 0.02, (N, 6))
+    rows = [line("time_s", "gx", "gy", "gz", "ax_g", "ay_g", "az_g")]
+    for k in range(N):
+        rows.append(line(T[k], *many(noise[k, :3] + [0, 0, 10]), *many(noise[k, 3:] + [0, 0, 1])))
+    imu = sd.read_imu(written(tmp_path, "table.csv", rows), units={"gyro": "deg/s"})
+    assert imu["gyro_z"].mean() == pytest.approx(10.0 / DEG, rel=0.01)
+
+
+def test_a_remedy_names_no_column_that_is_not_there(tmp_path):
+    rows = [line(*many(RATE[k], 2)) for k in range(N)]
+    with pytest.raises(DataError, check=coded("io.nameless-columns-open")) as refused:
+        sd.read_imu(written(tmp_path, "rates.csv", rows))
+    assert refused.value.finding.data["example"] == "gyro_x=1,gyro_y=2,gyro_z=3"
+
+
+def test_the_rate_that_a_flight_controller_demands_is_no_gyro(tmp_path):
+    """INAV: axisRate was proposed as the gyro; the position is GPS_coord."""
+    names = [f"{n}[{j}]" for n in ("axisRate", "gyroADC", "accSmooth") for j in range(3)]
+    rows = [line("time (us)", *names, "GPS_coord[0]", "GPS_coord[1]", "GPS_altitude")]
+    for k in range(N):
+        at = [f"{LAT[k // 50]:.7f}", f"{LON[k // 50]:.7f}", 41]
+        rows.append(line(round(1e6 * T[k]), 0, 0, 0, *samples(k, DEG), *at))
+    path = written(tmp_path, "LOG00001.csv", rows)
+    imu = sd.read_imu(path, units={"gyro": "deg/s", "accel": "m/s2"})
+    check(imu)
+    assert read_name("GPS_coord[0]", FIXES).quantity == "lat"
+    assert read_name("GPS_coord[1]", FIXES).quantity == "lon"
+    assert read_name("coord[0]", FIXES).quantity is None
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "unit"),
+    [
+        ("AngleRate Xv (deg/s)", "gyro_x", "deg/s"),
+        ("Accel Zv (m/s²)", "accel_z", "m/s2"),
+        ("UnCompGyroY [rad/s]", "gyro_y", "rad/s"),
+        ("Yaw [deg/s]", "gyro_z", "deg/s"),
+        ("Roll (Deg/Sec)", "gyro_x", "deg/s"),
+        ("Yaw [deg]", "heading", "deg"),
+        ("esp_timestamp_us", "time", "us"),
+        ("unified_time_s", "time", "s"),
+    ],
+)
+def test_names_of_strangers(name, quantity, unit):
+    said = read_name(name)
+    assert (said.quantity, said.unit) == (quantity, unit)
+    assert said.loose != UNKNOWN_WORDS
+
+
+def test_channels_of_racecapture(tmp_path):
+    """The first line has name, unit, range and rate of each channel; rows are between commas."""
+    cells = ['"Interval"|"ms"|0|0|1', '"Utc"|"ms"|0|0|1']
+    cells += [f'"Accel{a}"|"G"|-3.0|3.0|25' for a in "XYZ"]
+    cells += [f'"{n}"|"Deg/Sec"|-120|120|25' for n in ("Yaw", "Pitch", "Roll")]
+    rows = [line(*cells)]
+    for k in range(N):
+        three = many(FORCE[k] / STANDARD_GRAVITY)
+        rows.append(line(402 + round(1e3 * T[k]), 0, *three, *many(RATE[k, ::-1] * DEG)))
+    check(sd.read_imu(written(tmp_path, "rc_0.log", rows)))
+
+
+def test_a_unit_at_the_end_of_a_line_is_that_of_its_axes(tmp_path):
+    """Examples for the MPU-9250: ax = 12 ay = -3 az = 998 mg, and the rates below."""
+    rows = []
+    for k in range(N):
+        for label, unit, three in (
+            ("a", "mg", 1e3 * FORCE[k] / STANDARD_GRAVITY),
+            ("g", "deg/s", RATE[k] * DEG),
+        ):
+            words = " ".join(
+                f"{label}{a} = {v:.3f}" for a, v in zip("xyz", three.tolist(), strict=True)
+            )
+            rows.append(f"{words} {unit}")
+    imu = sd.read_imu(written(tmp_path, "serial.txt", rows), rate_hz=100.0)
+    check(imu, digits=1e-3)
+    assert "io.unit-inferred" not in {f.code for f in imu.findings}
+
+
+def test_clocks_that_are_the_same_are_one(tmp_path):
+    """Two stamps of a program beside that of a device, which is not rounded, were a question."""
+    names = ["Timestamp_ms", "DeviceTime_ms", "SystemTime_ms", *SIX]
+    rows = [line(*names[:3], *(f"{n}_rad_s" if n[0] == "g" else f"{n}_mps2" for n in SIX))]
+    for k in range(N):
+        at = 1e3 * T[k] * 100.0 / 51.2
+        rows.append(line(round(1.7e12 + at), f"{5021.3 + at:.3f}", round(1.7e12 + at), *samples(k)))
+    imu = sd.read_imu(written(tmp_path, "log.csv", rows))
+    assert imu.index[-1] == pytest.approx((N - 1) / 51.2, abs=1e-3)
+    np.testing.assert_allclose(imu[GYRO], RATE, atol=1e-5)
+
+
+def test_a_file_of_one_sensor_that_every_row_names(tmp_path):
+    rows = ["Attribute,Time stamp,x,y,z"]
+    rows += [line("Gyroscope", 156496 + 10 * k, *many(RATE[k] * DEG)) for k in range(N)]
+    path = written(tmp_path, "run.csv", rows)
+    imu = sd.read_imu(path, units={"gyro": "deg/s", "time": "ms"})
+    np.testing.assert_allclose(imu[GYRO], RATE, atol=1e-6)
+
+
+def test_bare_axes_under_lines_that_speak_of_one_sensor(tmp_path):
+    """Examples of Arduino print the rate and the unit, then X, Y and Z."""
+    top = ["Started", "Gyroscope sample rate = 100.00 Hz", "", "Gyroscope in degrees/second"]
+    body = [line(*many(RATE[k] * DEG), separator="\t") for k in range(N)]
+    imu = sd.read_imu(written(tmp_path, "serial.txt", [*top, "X\tY\tZ", *body]))
+    np.testing.assert_allclose(imu[GYRO], RATE, atol=1e-6)
+    np.testing.assert_allclose(np.diff(imu.index), STEP)
+    top = ["Started", "Accelerometer sample rate = 100.00 Hz", "", "Acceleration in g's"]
+    with pytest.raises(DataError, check=coded("io.accelerometer-alone")):
+        sd.read_imu(written(tmp_path, "force.txt", [*top, "X\tY\tZ", *body]))
+
+
+@pytest.mark.parametrize("keyed", [True, False])
+def test_streams_of_strava(tmp_path, keyed):
+    """Each stream is an object with its numbers as ``data``, under its name or with its type."""
+    count = len(LAT)
+    streams = {
+        "heartrate": [120] * count,
+        "altitude": [450.0] * count,
+        "latlng": [[float(a), float(b)] for a, b in zip(LAT, LON, strict=True)],
+        "time": list(range(count)),
+    }
+    said = {n: {"data": v, "original_size": count} for n, v in streams.items()}
+    whole = said if keyed else [{"type": n, **one} for n, one in said.items()]
+    path = tmp_path / "activity.json"
+    path.write_text(json.dumps(whole), encoding="utf-8")
+    table = sd.read_gnss(path, datum_height_m=0.0, position_sd_m=5.0)
+    np.testing.assert_allclose(table[["lat", "lon"]], np.column_stack([LAT, LON]))
+    np.testing.assert_allclose(np.diff(table.index), 1.0)
+
+
+def test_a_sensor_of_empatica_says_why_it_is_refused(tmp_path):
+    rows = [line(*["1574669480.000000"] * 3), line(*["32.000000"] * 3)]
+    rows += [line(*(round(v) for v in 64 * FORCE[k] / STANDARD_GRAVITY)) for k in range(N)]
+    with pytest.raises(DataError, check=coded("io.of-empatica")) as refused:
+        sd.read_imu(written(tmp_path, "ACC.csv", rows))
+    data = refused.value.finding.data
+    assert (data["start"], data["rate"]) == (1574669480.0, 32.0)
+
+
+def test_an_accelerometer_whose_axes_are_words_is_the_reason(tmp_path):
+    names = ["up/down", "right/left", "forward/back"]
+    rows = [line('"cts"', *(f'"Accelerometer ({n}) [m/s2]"' for n in names))]
+    rows += [line(f"{1e3 * T[k]:.3f}", *many(FORCE[k])) for k in range(N)]
+    with pytest.raises(DataError, check=coded("io.accelerometer-alone")):
+        sd.read_imu(written(tmp_path, "HERO.csv", rows))
+
+
+def test_fixes_by_the_clock_of_the_receiver_beside_that_since_the_start(tmp_path):
+    """TrackAddict: Time and UTC Time were a question."""
+    rows = ["Time,UTC Time,Latitude,Longitude,Altitude (m)"]
+    for k, (lat, lon) in enumerate(zip(LAT, LON, strict=True)):
+        rows.append(line(k, f"{1.7e9 + k:.3f}", f"{lat:.7f}", f"{lon:.7f}", 100))
+    table = sd.read_gnss(written(tmp_path, "log.csv", rows), datum_height_m=0.0, position_sd_m=5.0)
+    assert table.attrs["clock_origin"] + table.index[0] == pytest.approx(1.7e9)
+
+
+def test_names_behind_the_word_that_begins_every_row(tmp_path):
+    names = ["Time [ms]", *(f"{n[:-2]} {n[-1].upper()}" for n in SIX)]
+    rows = [f"imu: {line(*names[:1], *(f'{n} [rad/s]' for n in names[1:4]), *names[4:])}"]
+    rows += [f"imu: {line(round(1e3 * T[k]), *samples(k))}" for k in range(N)]
+    check(sd.read_imu(written(tmp_path, "serial.txt", rows)))
+
+
+def test_a_sentence_after_each_line_of_labels(tmp_path):
+    rows = ["Initializing MPU6050...", "MPU6050 connected"]
+    for k in range(N):
+        labels = zip(("GyroX", "GyroY", "GyroZ", "AccX", "AccY", "AccZ"), samples(k), strict=True)
+        rows += [" ".join(f"{n}: {v}" for n, v in labels), "Gyroscope data looks good."]
+    path = written(tmp_path, "serial.txt", rows)
+    check(sd.read_imu(path, rate_hz=100.0, units={"gyro": "rad/s"}))
+
+
+def test_the_rate_of_a_heart_is_no_gyro(tmp_path):
+    rows = ["unix_timestamp,heart_rate_voltage,accelerometer_x,accelerometer_y,accelerometer_z"]
+    rows += [line(round(1.5e12 + 1e3 * T[k]), 517, *many(FORCE[k], 2)) for k in range(N)]
+    with pytest.raises(DataError, check=coded("io.accelerometer-alone")):
+        sd.read_imu(written(tmp_path, "heart.csv", rows))
+
+
+def test_of_a_simulation_the_sensor_is_proposed(tmp_path):
+    names = [f"{b}{n}_{a}" for b in ("", "imu_") for n in ("accel", "gyro") for a in "xyz"]
+    rows = [line("time_s", *names)]
+    for k in range(N):
+        truth = [0.0, 0.0, 0.0, *many(RATE[k] * 0.9)]
+        rows.append(line(T[k], *truth, *many(FORCE[k]), *many(RATE[k])))
+    path = written(tmp_path, "simulation.csv", rows)
+    with pytest.raises(DataError, check=coded("io.questions")) as refused:
+        sd.read_imu(path)
+    assert refused.value.finding.data["flags"] == "--columns gyro=imu_gyro,accel=imu_accel"
+
+
+def test_gravity_in_three_letters_is_summed_with_linear_acceleration(tmp_path):
+    names = [f"{n}{a}" for n in ("Gra", "LinearAcc", "Gyro") for a in "XYZ"]
+    rows = [line("t_s", *names)]
+    for k in range(N):
+        rows.append(line(T[k], *many(FORCE[k] - 0.5), *many([0.5] * 3), *many(RATE[k])))
+    check(sd.read_imu(written(tmp_path, "walk.csv", rows)))
