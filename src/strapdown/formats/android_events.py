@@ -217,7 +217,8 @@ def read(path: Path) -> RawLog:
         if len(fields) > kind:
             which = letters.get(fields[kind]) or kind_of(fields[kind])
         if which is None:
-            unknown.add(fields[kind] if len(fields) > kind else line)
+            if events:  # those above the rows are names
+                unknown.add(fields[kind] if len(fields) > kind else line)
             continue
         if len(fields) < first + 3:
             if row == len(lines) and not text.endswith("\n"):

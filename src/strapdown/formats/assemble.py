@@ -90,7 +90,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     found = find_columns(raw, options, questions)
     missing = [q for q in GYRO if q not in found]
     # Of columns that the user names, the rows may be those of other sensors, too.
-    if (missing or found["gyro_x"].basis in ("option", "open")) and (kinds := rows_of_kinds(raw)):
+    asked = not missing and found["gyro_x"].basis in ("option", "open")
+    if (missing or asked) and (kinds := rows_of_kinds(raw, asked=asked)):
         raise kinds
     if missing:
         raise without_gyro(raw, missing)

@@ -179,8 +179,17 @@ def of_one_sensor(raw: RawLog) -> RawLog:
     return raw
 
 
-def rows_of_kinds(raw: RawLog) -> DataError | None:
-    """Make the error for rows of sensors of several kinds in turn; none if there are no such."""
+#: A column of an axis without a sensor: ``X-Axis``, ``value x``.
+_BARE_X = re.compile(r"(?:value[\W_]*)?x(?:[\W_]*(?:axis|value|data))?", re.I)
+
+
+def rows_of_kinds(raw: RawLog, *, asked: bool) -> DataError | None:
+    """Make the error for rows of sensors of several kinds in turn; none if there are no such.
+
+    `asked`: whether the user names the gyro; else its columns may be those without a sensor.
+    """
+    if not (asked or any(_BARE_X.fullmatch(name.strip()) for name in raw.columns)):
+        return None
     for name, _, counts in _in_turn_by(raw, _OF_SENSORS | _OF_KINDS):
         kinds = [f"{kind} ({n} rows)" for kind, n in counts.items()]
         return raw.fault("io.rows-of-kinds", name=name, kinds=kinds)

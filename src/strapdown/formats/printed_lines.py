@@ -90,7 +90,9 @@ def as_rows(numbered: Lines) -> Lines:
     tags = {m[1] if m else "" for m in (_TAGGED.match(line) for _, line in rest)}
     if named and tags == {named[1]} and "," in top[0][1]:
         numbered = [(row, line.replace(f"{named[1]}:", "", 1)) for row, line in numbered]
-        top, tags = numbered[:SEARCHED], set()
+        top = numbered[:SEARCHED]
+    if named:
+        tags = {""}
     if len(tags) == 1 and "" not in tags:
         # Three numbers are a vector of that name.
         between = separator_of(top[0][1])

@@ -386,7 +386,7 @@ def _of_columns(path: Path, content: Any) -> RawLog:
             meta[str(name)] = given
             continue
         arrays[str(name)] = _array_of(given)
-    return with_force_summed(_with_one_clock(raw_log(path, arrays, {}, meta)))
+    return with_force_summed(_with_one_clock(raw_log(path, arrays, units, meta)))
 
 
 def _are_names(value: Any, width: int) -> bool:

@@ -1379,3 +1379,15 @@ def test_gravity_in_three_letters_is_summed_with_linear_acceleration(tmp_path):
     for k in range(N):
         rows.append(line(T[k], *many(FORCE[k] - 0.5), *many([0.5] * 3), *many(RATE[k])))
     check(sd.read_imu(written(tmp_path, "walk.csv", rows)))
+
+
+def test_units_that_columns_in_json_state(tmp_path):
+    """They were left out, and inferred or asked for."""
+    held: dict = {"time": T.tolist()}
+    for name, unit, values in (("gyro", "deg/s", 1e-3 * RATE * DEG), ("accel", "m/s2", FORCE)):
+        held[name] = {a: values[:, k].tolist() for k, a in enumerate("xyz")} | {"unit": unit}
+    path = tmp_path / "log.json"
+    path.write_text(json.dumps(held), encoding="utf-8")
+    imu = sd.read_imu(path)
+    np.testing.assert_allclose(imu[GYRO], 1e-3 * RATE, atol=1e-12)
+    assert "io.unit-inferred" not in {f.code for f in imu.findings}
