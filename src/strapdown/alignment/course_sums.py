@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.alignment.inertial_sums import InertialSums, sum_inertially
+from strapdown.alignment.inertial_sums import InertialSums, sum_increments
 from strapdown.constants import Indices
 from strapdown.errors import DataError
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
@@ -21,13 +21,14 @@ from strapdown.tables import (
     ACCEL,
     GEODETIC,
     GYRO,
+    MOTION,
     POSITION_SD,
     VELOCITY,
     VELOCITY_SD,
     check_gnss,
     usable,
 )
-from strapdown.tables.checks import Array, source_of
+from strapdown.tables.checks import Array, check_rows, index_of, source_of, view_of
 
 #: The rate at an instant is a mean over so much before and after it, s: little against the swaying
 #: of a vehicle, which its antenna follows.
@@ -77,17 +78,19 @@ def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> D
     ``C_true = exp([theta x]) C``, and the true rate and force less by db and da than taken, it is
     ``theta(t) = theta_e + int_t^e C db`` and ``v(t) = v_e - int_t^e (C f + theta x C f - C da)``.
     """
-    stamps = imu.index.to_numpy(dtype=np.float64)
-    columns = [*GYRO, *ACCEL]
-    mended = _mended(imu[columns].to_numpy(), stamps, means, errors)
-    table = pd.DataFrame(mended, index=imu.index, columns=columns, copy=False)
-    table.attrs = dict(imu.attrs)
+    from strapdown._kernels.motion_increments import motion_increments_linear
+
+    stamps = index_of(imu)
+    mended = _mended(view_of(imu, [*GYRO, *ACCEL]), stamps, means, errors)
     n = len(stamps) - 1
+    rows = np.empty((n, len(MOTION)))
+    motion_increments_linear(np.diff(stamps), mended, imu.attrs["sampling"] == "mean", rows)
+    check_rows(rows, MOTION, source_of(imu))
     before = np.clip(np.searchsorted(stamps, time, side="right") - 1, 0, n - 1)
     even = np.searchsorted(stamps, np.linspace(stamps[0], stamps[-1], 2 * STRETCHES + 1)[1:-1])
     ends = np.unique(np.concatenate([before, before + 1, np.clip(even, 1, n), [n]]))
     ends = ends[ends > 0].astype(np.int64)
-    sums = sum_inertially(table, ends)
+    sums = sum_increments(stamps, rows, ends)
     steps = rotation.rotate(sums.turned[:-1], sums.dv)
     gained = np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
     end = rotation.dcm_from_quaternion(sums.turned[-1]).T

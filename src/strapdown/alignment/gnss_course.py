@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -325,7 +326,13 @@ class Observed(NamedTuple):
     told: NDArray[np.bool_]
     sd: Array
     courses: tuple[Array, Array, Array]
-    rests: list[tuple[Array, Array, Array]]
+    rests: tuple[tuple[Array, Array, Array], ...]
+
+    @property
+    def parts(self) -> tuple[tuple[Array, Array, Array], ...]:
+        """Residuals, derivatives and weights of the fixes, one by one, the courses, the rests."""
+        fixes = self.gap.ravel(), self.rows.reshape(self.gap.size, -1), np.zeros(self.gap.size)
+        return (fixes, self.courses, *self.rests)
 
 
 @dataclass(frozen=True, eq=False)
@@ -351,35 +358,36 @@ class CourseFit:
         residual of the three.
         """
         seen = self._observed(found)
-        gap, rows, told, stated, courses = seen.gap, seen.rows, seen.told, seen.sd, seen.courses
+        told, stated, courses = seen.told, seen.sd, seen.courses
         weight, scale, slip, k = found.weight, found.scale, found.slip, len(self.fixes.time)
-        onward = np.ones(len(courses[0]))
+        onward, of_courses = np.ones(len(courses[0])), slice(3 * k, 3 * k + len(courses[0]))
+        gap, rows, sure = (np.concatenate(each) for each in zip(*seen.parts, strict=True))
+        scaled = rows * seen.prior
         for _ in range(SWEEPS):
-            share = told * weight[:, None] / np.square(scale * stated)
-            parts = [
-                (gap.ravel(), rows.reshape(3 * k, -1), share.ravel()),
-                (courses[0], courses[1], onward * courses[2] / slip),
-                *seen.rests,
-            ]
-            x, inverse, spent = _solve(parts, seen.prior, found.errors)
-            left = np.where(told, np.abs(gap - rows @ x) / stated, 0.0)
+            sure[: 3 * k] = (told * weight[:, None] / np.square(scale * stated)).ravel()
+            sure[of_courses] = onward * courses[2] / slip
+            x, root, spent = _solve(gap, scaled, sure, seen.prior, found.errors)
+            residuals = gap - scaled @ x
+            left = np.where(told, np.abs(residuals[: 3 * k]).reshape(k, 3) / stated, 0.0)
             used = left[told & (weight > 0.0)[:, None]]
             free = len(used) + len(onward) - spent
             if free >= LEAST_FREE:
                 middle = float(np.median(used)) * math.sqrt((len(used) + len(onward)) / free)
                 scale = max(1.0, MAD_TO_SD * middle)
-            weight = np.array([influence.weight(float(u)) for u in left.max(axis=1) / scale])
-            aside = courses[0] - courses[1] @ x
+            weight = _weights(left.max(axis=1) / scale, influence)
+            aside = residuals[of_courses]
             onward = (np.abs(aside) < GROSS).astype(np.float64)
             slip = _excess((aside * np.sqrt(courses[2]))[onward > 0.0])
+        x, root = seen.prior * x, root * seen.prior
+        inverse = root.T @ root
         offset = -float(x[OFFSET]), float(np.sqrt(inverse[OFFSET, OFFSET]))
         handed, sign = HANDED, SIGN
         if self.by_places:
             handed, sign = np.r_[HANDED, END_PLACE], np.r_[SIGN, np.ones(3)]
             # The displacement by a wrong clock is left to the owner of that error.
-            shift = np.eye(len(inverse))
-            shift[END_PLACE, OFFSET] = found.velocity + x[END_VELOCITY]
-            inverse = shift @ inverse @ shift.T
+            shift = found.velocity + x[END_VELOCITY]
+            inverse[END_PLACE] += np.outer(shift, inverse[OFFSET])
+            inverse[:, END_PLACE] += np.outer(inverse[:, OFFSET], shift)
         inverse = self._at_an_end(inverse, seen.sums)
         return CourseEstimate(
             rotation.dcm_from_rotation_vector(x[TURN]) @ found.C,
@@ -436,7 +444,7 @@ class CourseFit:
             told,
             np.sqrt(np.where(told, np.square(fix_sd), 1.0) + within),
             self._courses(found, sums, C[:k], there[:k], level[:k], by[:k], turns[:k]),
-            [self._rest(rest, found, C[k + i], turns[k + i]) for i, rest in enumerate(rests)],
+            tuple(self._rest(rest, found, C[k + i], turns[k + i]) for i, rest in enumerate(rests)),
         )
 
     def at_first_sample(
@@ -461,14 +469,15 @@ class CourseFit:
         stamps = np.zeros(0) if anchors is None else anchors[0]
         seen = self._observed(found, np.append(stamps, first))
         k = len(fixes.time)
-        share = ONCE * seen.told * found.weight[:, None] / np.square(found.scale * seen.sd)
-        gap, rows, weight = seen.courses
-        parts = [
-            (seen.gap.ravel(), seen.rows.reshape(3 * k, -1), share.ravel()),
-            (gap, rows, weight * (np.abs(gap) < GROSS) / found.slip),
-            *((gap, rows, ONCE * weight) for gap, rows, weight in seen.rests),
-        ]
-        _, inverse, _ = _solve(parts, seen.prior, found.errors)
+        gap, rows, sure = (np.concatenate(each) for each in zip(*seen.parts, strict=True))
+        of_rests = 3 * k + len(seen.courses[0])
+        sure[: 3 * k] = (seen.told * found.weight[:, None]).ravel()
+        sure[: 3 * k] /= np.square(found.scale * seen.sd).ravel()
+        sure[3 * k : of_rests] *= (np.abs(seen.courses[0]) < GROSS) / found.slip
+        sure[: 3 * k] *= ONCE
+        sure[of_rests:] *= ONCE
+        _, root, _ = _solve(gap, rows * seen.prior, sure, seen.prior, found.errors)
+        root *= seen.prior
         here = len(seen.level) - 1
         level = seen.level[here]
         J = np.zeros((len(HANDED) + 3, self.unknowns))
@@ -484,7 +493,8 @@ class CourseFit:
             J[len(HANDED) :] = -by_at
         # The shift by a wrong clock is left to the owner of that error.
         J[:, OFFSET] = 0.0
-        covariance = self._at_an_end(J @ inverse @ J.T, seen.sums)
+        moved = root @ J.T
+        covariance = self._at_an_end(moved.T @ moved, seen.sums)
         if anchors is not None:
             covariance[len(HANDED) :, len(HANDED) :] += np.diag(own)
         state = CourseEstimate(
@@ -609,7 +619,7 @@ class CourseFit:
         by[from_end] += (spun @ along + running_integral(past, bent @ along))[1:]
         k = len(self.fixes.time)
         by[:k, :, OFFSET] = np.gradient(v[:k], -sums.until_end[:k], axis=0)
-        turn = self.site.earth_rate * sums.until_end[:, None]
+        turn = self._earth_rate * sums.until_end[:, None]
         turn[from_end] += ways[1:] @ of_way.T
         return v, by, rotation.dcm_from_rotation_vector(turn)
 
@@ -619,26 +629,36 @@ class CourseFit:
         A series in the turn of the Earth: of 300 s, 0.02 rad, the first order leaves 0.1 m/s.
         """
         T = until_end[:, None]
-        term, power = self.site.gravity, T
+        term, power = self._gravity, T
         once, twice = np.zeros((len(T), 3)), np.zeros((len(T), 3))
         for order in range(2, 7):
             once += power * term
             power = power * T / order
             twice += power * term
-            term = -np.cross(self.site.earth_rate, term)
+            term = -self._spun @ term
         return once, twice
 
-    @property
+    @cached_property
+    def _earth_rate(self) -> Array:
+        """Rate of the Earth, level axes, (3,), rad/s."""
+        return self.site.earth_rate
+
+    @cached_property
+    def _gravity(self) -> Array:
+        """Gravity, level axes, (3,), m/s²."""
+        return self.site.gravity
+
+    @cached_property
     def _spun(self) -> Array:
         """Matrix of the cross product with the rate of the Earth, (3, 3)."""
-        return np.asarray(rotation.cross_matrix(self.site.earth_rate[None])[0])
+        return np.asarray(rotation.cross_matrix(self._earth_rate[None])[0])
 
-    @property
+    @cached_property
     def _bent(self) -> Array:
         """Change of gravity's direction by a way, (3, 3): ``(W s) x g`` of the transport rate."""
-        return np.asarray(-rotation.cross_matrix(self.site.gravity[None])[0] @ self._of_way)
+        return np.asarray(-rotation.cross_matrix(self._gravity[None])[0] @ self._of_way)
 
-    @property
+    @cached_property
     def _of_way(self) -> Array:
         """Turn of the level axes by a way, (3, 3), rad/m: W of the transport rate."""
         site = self.site
@@ -695,7 +715,7 @@ class CourseFit:
         self, found: CourseEstimate, sums: DriveSums, turns: Array, rows: slice
     ) -> tuple[Array, Array]:
         """Lever arm of the antenna at instants, in the same axes, and its derivatives."""
-        fixed = rotation.dcm_from_rotation_vector(self.site.earth_rate * sums.until_end[rows, None])
+        fixed = rotation.dcm_from_rotation_vector(self._earth_rate * sums.until_end[rows, None])
         axes = fixed @ found.C @ sums.turned[rows]
         arm = axes @ np.array(self.model.antenna.lever_arm)
         by_arm = -(rotation.cross_matrix(arm) @ turns[rows])
@@ -774,37 +794,33 @@ class CourseFit:
         self, rest: RestRate, found: CourseEstimate, C: Array, turns: Array
     ) -> tuple[Array, Array, Array]:
         """The gyros read their bias and the Earth's rate, ``C' exp(-[theta x]) w_ie``."""
-        earth, inputs = self.site.earth_rate, self.means - found.bias
-        A = C.T @ rotation.cross_matrix(earth[None])[0] @ turns
+        earth, inputs = self._earth_rate, self.means - found.bias
+        A = C.T @ self._spun @ turns
         A[:, GYRO_BIAS] += np.eye(3)
         A[:, GYRO_MATRIX] -= np.kron(np.eye(3), inputs[:3])
-        force = -C.T @ self.site.gravity
+        force = -C.T @ self._gravity
         A[:, GYRO_BY_FORCE] += np.kron(np.eye(3), force - inputs[3:])
         gap = rest.rate - found.bias[:3] - C.T @ earth
         return gap, A, 1.0 / np.square(np.maximum(rest.sd, LEAST_RATE_SD))
 
-    def search(self) -> CourseEstimate:
+    def search(self, near: CourseEstimate | None = None) -> CourseEstimate:
         """Solve over increasing parts that end with the record, up to the whole.
 
-        Gross errors among the fixes are excluded.
+        Gross errors among the fixes are excluded. `near`: of nearly the same record, from which the
+        whole is solved at once.
         """
         fixes = self.fixes
         end, begin = float(self.imu.index[-1]), float(fixes.time[0])
-        newest = fixes.time[-min(LEAST_FIXES, len(fixes.time))]
-        length = end - min(newest, fixes.time[-1] - LEAST_LENGTH)
-        bias, sd = self._bias_of_rests()
-        least = min(LEAST_BASELINES * fixes.baseline, end - begin)
-        if sd * least > LINEAR:
-            # Fixes may be missing at the end.
-            part = self._part(end - max(length, least))
-            bias[:3], sd = part._bias_of_courses(bias[:3], sd)
-        length = max(length, LINEAR / max(sd, 1e-12), least)
+        bias, length = self._begin() if near is None else (near.errors, end - begin)
         found = None
         while True:
-            begin_here = max(end - length, begin)
+            # What is left beside the whole is no part of its own.
+            begin_here = begin if WHOLE * length > end - begin else end - length
             fit = self._part(begin_here)
             if found is None:
                 found = fit._guess(bias)
+                if near is not None:
+                    found = replace(found, C=near.C, velocity=near.velocity)
             else:
                 older = len(fit.fixes.time) - len(found.weight)
                 errors = found.errors.copy()
@@ -835,6 +851,19 @@ class CourseFit:
                 onward=1.0 - found.onward,
             )
         return found
+
+    def _begin(self) -> tuple[Array, float]:
+        """Errors of the sensors to begin with, and length of the first part, s."""
+        fixes, end = self.fixes, float(self.imu.index[-1])
+        newest = fixes.time[-min(LEAST_FIXES, len(fixes.time))]
+        length = end - min(newest, fixes.time[-1] - LEAST_LENGTH)
+        errors, sd = self._bias_of_rests()
+        least = min(LEAST_BASELINES * fixes.baseline, end - float(fixes.time[0]))
+        if sd * least > LINEAR:
+            # Fixes may be missing at the end.
+            part = self._part(end - max(length, least))
+            errors[:3], sd = part._bias_of_courses(errors[:3], sd)
+        return errors, max(length, LINEAR / max(sd, 1e-12), least)
 
     def beyond(self, found: CourseEstimate) -> float:
         """Factor of the biases of the accelerometers over their stated standard deviation.
@@ -902,7 +931,7 @@ class CourseFit:
         v0 = np.median(fixes.velocity[first], axis=0)
         v1 = np.median(fixes.velocity[last], axis=0)
         gained = sums.gained[first].mean(axis=0) - sums.gained[last].mean(axis=0)
-        force_n = (v1 - v0) / length - self.site.gravity
+        force_n = (v1 - v0) / length - self._gravity
         fast = np.flatnonzero(fixes.fast & (fixes.time >= fixes.time[-1] - HEADING_SPAN))
         course = np.arctan2(fixes.velocity[fast, 1], fixes.velocity[fast, 0]) + self.model.yaw
         heading = float(course[-1])
@@ -915,28 +944,48 @@ class CourseFit:
         return CourseEstimate(C, v1, bias, nothing, _smooth(fixes), _near_neighbours(fixes), 1.0)
 
 
-def _solve(
-    parts: list[tuple[Array, Array, Array]], sd: Array, errors: Array
-) -> tuple[Array, Array, float]:
-    """Least squares of residuals, rows and weights: unknowns, covariance, parameters spent.
+def _weights(residuals: Array, influence: Influence) -> Array:
+    """Weights of residuals, (k,): 1 in the linear range, where most are."""
+    out = np.ones(len(residuals))
+    for k in np.flatnonzero(residuals > influence.linear).tolist():
+        out[k] = influence.weight(float(residuals[k]))
+    return out
 
-    In units of their standard deviations the unknowns have a prior of unit variance; for sensor
-    errors it applies to the total, including the part already subtracted.
+
+def _solve(
+    gap: Array, scaled: Array, weight: Array, sd: Array, errors: Array
+) -> tuple[Array, Array, float]:
+    """Least squares: unknowns, a root R of their covariance R'R, and parameters spent.
+
+    In units of their standard deviations `sd`, as the columns of `scaled` are, the unknowns have a
+    prior of unit variance; for sensor errors it applies to the total, including the part already
+    subtracted. `gap`, `weight`: residuals, and their weights.
     """
-    normal = np.zeros((len(sd), len(sd)))
-    right = np.zeros(len(sd))
-    for gap, rows, weight in parts:
-        scaled = rows * sd
-        normal += scaled.T @ (weight[:, None] * scaled)
-        right += scaled.T @ (weight * gap)
-    normal[np.diag_indices(len(sd))] += 1.0
+    root = np.sqrt(weight)
     known = np.where(sd[OF_SENSORS] > 0.0, sd[OF_SENSORS], np.inf)
+    half = root[:, None] * scaled
+    right = half.T @ (root * gap)
     right[OF_SENSORS] -= errors / known
+    normal = half.T @ half
+    normal[np.diag_indices(len(sd))] += 1.0
     size = 1.0 / np.sqrt(np.diagonal(normal))
-    inverse = np.linalg.inv(size[:, None] * normal * size) * np.outer(size, size)
-    inverse = 0.5 * (inverse + inverse.T)
-    spent = float(len(sd) - np.trace(inverse))
-    return sd * (inverse @ right), sd[:, None] * inverse * sd, spent
+    inverse = _inverse_of_lower(np.linalg.cholesky(size[:, None] * normal * size)) * size
+    return (right @ inverse.T) @ inverse, inverse, float(len(sd) - np.square(inverse).sum())
+
+
+#: Rows up to which a triangle is inverted as any other matrix.
+SMALL_TRIANGLE = 24
+
+
+def _inverse_of_lower(lower: Array) -> Array:
+    """Inverse of a lower triangular matrix, by halves: numpy has that of any matrix alone."""
+    if len(lower) <= SMALL_TRIANGLE:
+        return np.linalg.inv(lower)
+    half, out = len(lower) // 2, np.zeros_like(lower)
+    out[:half, :half] = _inverse_of_lower(lower[:half, :half])
+    out[half:, half:] = _inverse_of_lower(lower[half:, half:])
+    out[half:, :half] = -out[half:, half:] @ (lower[half:, :half] @ out[:half, :half])
+    return out
 
 
 def _excess(residuals: Array) -> float:
@@ -958,8 +1007,9 @@ def _excess(residuals: Array) -> float:
 # Attitude error by a bias over the part that is solved, rad, one standard deviation: the second
 # order is a hundredth.
 LINEAR = 0.2
-# Number of fixes and their duration, s, of the first part, and least factor of its growth.
-LEAST_FIXES, LEAST_LENGTH, GROWTH = 4, 1.0, 1.5
+# Number of fixes and their duration, s, of the first part, and least factor of its growth; one by
+# less, to the whole, is taken with it.
+LEAST_FIXES, LEAST_LENGTH, GROWTH, WHOLE = 4, 1.0, 1.5, 1.1
 # Gauss-Newton steps over each part: iteration ends when the largest step is below a part of its
 # standard deviation.
 STEPS, SMALL = 8, 0.02

@@ -10,7 +10,7 @@ import pandas as pd
 from strapdown.constants import Indices
 from strapdown.increments import motion_increments
 from strapdown.tables import DV, MOTION, values_of
-from strapdown.tables.checks import Array
+from strapdown.tables.checks import Array, index_of
 
 # Nodes over which sensor errors are taken as constant: alignment depends on changes over a fifth of
 # the record and more, and the weight of a node of a 240th is accurate to 1e-4.
@@ -58,11 +58,13 @@ def sum_inertially(imu: pd.DataFrame, ends: Indices | None = None) -> InertialSu
     `ends` ((m,)): samples at which nodes end, rising, above zero, the last one that of the record;
     equal parts of the time, if not given. DataError: as `increments.motion_increments`.
     """
+    return sum_increments(index_of(imu), values_of(motion_increments(imu), MOTION), ends)
+
+
+def sum_increments(time: Array, rows: Array, ends: Indices | None = None) -> InertialSums:
+    """As `sum_inertially`, of the stamps and the rows of `increments.motion_increments`."""
     from strapdown._kernels.sums import inertial_sums
 
-    increments = motion_increments(imu)
-    rows = values_of(increments, MOTION)
-    time = imu.index.to_numpy(dtype=np.float64)
     stamps = time - time[0]
     n = len(rows)
     nodes = min(NODES, n)

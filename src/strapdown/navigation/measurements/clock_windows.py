@@ -252,6 +252,7 @@ def _window(
     stamps, offset = index_of(gnss), start
     if len(part) < 2:
         return None
+    found = None
     for _ in range(ROUNDS):
         near = (stamps - offset >= span[0]) & (stamps - offset <= span[1])
         fixes = gnss[near].set_axis(stamps[near] - offset)
@@ -262,9 +263,10 @@ def _window(
         unknown = replace(antenna, time_offset_sd=UNKNOWN, lever_arm_sd=ARM)
         way = GnssCourse(mounting_yaw_sd_deg=MOUNTING, axle_sd=AXLE)
         try:
-            more, sd = way.fit(part, site, sensors, fixes, unknown).search().offset
+            found = way.fit(part, site, sensors, fixes, unknown).search(found)
         except (DataError, DivergenceError):
             return None
+        more, sd = found.offset
         known = 1.0 - (sd / UNKNOWN) ** 2
         if not known > 0.5:
             return None
