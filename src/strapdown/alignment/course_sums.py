@@ -156,34 +156,41 @@ def _partials(
     """Lengths of the stretches, and the contribution of errors at the beginning of each node."""
     m = len(sums.node_length)
     times = end @ sums.times
-    middle = sums.middles
-    of = _stretch_of(middle, sums.length)
-    mine = (of[:, None] == np.arange(STRETCHES)).astype(np.float64)
-    alone = np.einsum("mhi,ms->mhsi", times, mine).reshape(m, 3, 3 * STRETCHES)
+    of = _stretch_of(sums.middles, sums.length)
+    alone = 3 * of[:, None, None] + np.arange(3)
+    nodes, axes = np.arange(m)[:, None, None], np.arange(3)[:, None]
 
     def above(products: Array, mean: Array) -> Array:
-        out = np.einsum("gh,mhij->mgij", end, products) - times[:, :, :, None] * mean
+        out = (end @ products.reshape(m, 3, 9)).reshape(m, 3, 3, 3) - times[:, :, :, None] * mean
         return np.asarray(out.reshape(m, 3, 9))
 
-    by_rate, by_force = above(sums.turns, means[:3]), above(sums.pushes, means[3:])
-    by_gyro = np.concatenate([times, by_rate, by_force, alone], axis=2)
-    by_accel = np.concatenate([times, by_force, alone], axis=2)
+    by_force = above(sums.pushes, means[3:])
+    by_gyro, by_accel = (np.zeros((m, 3, width + 3 * STRETCHES)) for width in (21, 12))
+    by_gyro[:, :, :3] = by_accel[:, :, :3] = times
+    by_gyro[:, :, 3:12] = above(sums.turns, means[:3])
+    by_gyro[:, :, 12:21] = by_accel[:, :, 3:12] = by_force
+    by_gyro[nodes, axes, 21 + alone] = by_accel[nodes, axes, 12 + alone] = times
     at_edge = _from_end(by_gyro)
     push = np.diff(gained, axis=0) @ end.T
-    by_turn = rotation.cross_matrix(push) @ (at_edge[1:] + 0.5 * by_gyro)
+    by_gyro *= 0.5
+    by_gyro += at_edge[1:]
+    by_turn = rotation.cross_matrix(push) @ by_gyro
     stretch = np.bincount(of, sums.node_length, STRETCHES).astype(np.float64)
     return stretch, at_edge, _from_end(by_accel), _from_end(by_turn)
 
 
 def _from_end(nodes: Array) -> Array:
     """Sums of nodes from the beginning of each to the end, zero at the end."""
-    nothing = np.zeros((1, *nodes.shape[1:]))
-    return np.concatenate([np.cumsum(nodes[::-1], axis=0)[::-1], nothing])
+    out = np.empty((len(nodes) + 1, *nodes.shape[1:]))
+    out[-1] = 0.0
+    np.cumsum(nodes[::-1], axis=0, out=out[-2::-1])
+    return out
 
 
 def _integral_to_end(edges: Array, values: Array) -> Array:
     """Integral over time from each edge to the last, by the trapezoidal rule."""
-    steps = np.diff(edges)[:, None, None] * 0.5 * (values[1:] + values[:-1])
+    steps = values[1:] + values[:-1]
+    steps *= 0.5 * np.diff(edges)[:, None, None]
     return _from_end(steps)
 
 
@@ -295,10 +302,9 @@ def course_fixes(
     check_gnss(gnss)
     source = source_of(gnss)
     first, last = float(imu.index[0]), float(imu.index[-1])
-    stamps = gnss.index.to_numpy(dtype=np.float64)
-    velocity = gnss[VELOCITY].to_numpy(dtype=np.float64)
-    sd = gnss[VELOCITY_SD].to_numpy(dtype=np.float64)
-    sound = gnss["quality"].to_numpy() > 0.0
+    stamps = index_of(gnss)
+    velocity, sd = view_of(gnss, VELOCITY), view_of(gnss, VELOCITY_SD)
+    sound = view_of(gnss, ["quality"])[:, 0] > 0.0
     measured = np.isfinite(sd[:, :2]).all(axis=1)
     placed = usable(gnss, POSITION_SD)
     time = stamps - antenna.velocity_delay
@@ -330,9 +336,9 @@ def _climbs(gnss: pd.DataFrame, rows: Indices, velocity: Array, sd: Array) -> tu
     """Vertical velocities by the heights, of fixes with speed and course alone."""
     if len(rows) < LEAST_PLACES:
         return velocity, sd
-    time = gnss.index.to_numpy(dtype=np.float64)[rows]
-    down = -gnss["alt"].to_numpy(dtype=np.float64)[rows]
-    own = np.maximum(gnss[POSITION_SD[2]].to_numpy(dtype=np.float64)[rows], LEAST_SD)
+    time = index_of(gnss)[rows]
+    down = -view_of(gnss, ["alt"])[rows, 0]
+    own = np.maximum(view_of(gnss, POSITION_SD[2:])[rows, 0], LEAST_SD)
     baseline = max(CLIMBS, 2.0 * float(np.median(np.diff(time))))
     climb, climb_sd = _differences(time, down[:, None], own[:, None], baseline)
     velocity, sd = velocity.copy(), sd.copy()
@@ -349,9 +355,8 @@ def _by_places(
     largest_sd: float,
 ) -> CourseFixes:
     """Positions of fixes without velocities, and their differences."""
-    time = gnss.index.to_numpy(dtype=np.float64)[rows]
-    geodetic = gnss[GEODETIC].to_numpy(dtype=np.float64)[rows]
-    sd = np.maximum(gnss[POSITION_SD].to_numpy(dtype=np.float64)[rows], LEAST_SD)
+    time, geodetic = index_of(gnss)[rows], view_of(gnss, GEODETIC)[rows]
+    sd = np.maximum(view_of(gnss, POSITION_SD)[rows], LEAST_SD)
     place = ned_from_geodetic(geodetic, geodetic[-1])
     step = float(np.median(np.diff(time)))
     if antenna.correlated_share > 0.0:

@@ -53,7 +53,7 @@ from strapdown.estimation.robust import Huber, Igg3, Influence
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
 from strapdown.sensors.uncertainty import FREEDOM, ImuUncertainty
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, usable
-from strapdown.tables.checks import Array, is_number, source_of
+from strapdown.tables.checks import Array, index_of, is_number, source_of, view_of
 
 #: Largest allowed tilt error, rad: beyond it attitude errors are no longer small.
 LARGEST_TILT_SD = 0.35
@@ -195,7 +195,7 @@ class GnssCourse(CoarseAlignment):
         if newest.size:
             # Axes and rate of the Earth are those of the end: of a place 4 km before, the start
             # would be 2 cm/s off in five minutes.
-            places = gnss[GEODETIC].to_numpy(dtype=np.float64)[newest]
+            places = view_of(gnss, GEODETIC)[newest]
             lat_deg, lon_deg, alt = np.median(places, axis=0).tolist()
             site = Site(lat_deg, lon_deg, alt, site.ellipsoid)
         rests = rest_rates(imu, fixes, sensors)
@@ -203,7 +203,7 @@ class GnssCourse(CoarseAlignment):
         slip = math.radians(self.sideslip_sd_deg)
         yaw_sd = math.hypot(slip, math.radians(self.mounting_yaw_sd_deg))
         model = CourseModel(self.reverse, yaw, yaw_sd, SLIP_SHARE * slip, self.axle_sd, antenna)
-        means = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64).mean(axis=0)
+        means = view_of(imu, [*GYRO, *ACCEL]).mean(axis=0)
         return CourseFit(imu, means, fixes, rests, site, sensors, model)
 
 
@@ -536,12 +536,11 @@ class CourseFit:
     ) -> tuple[Array, Array, Array, Array] | None:
         """Stamps, positions and sd of the first fixes with one, north-east-down of an origin."""
         fixes = self.fixes
-        stamps = gnss.index.to_numpy(dtype=np.float64)
-        sd = gnss[POSITION_SD].to_numpy(dtype=np.float64)
+        stamps, sd = index_of(gnss), view_of(gnss, POSITION_SD)
         placed = _placed(gnss, self.imu)
         if not placed.size:
             return None
-        places = gnss[GEODETIC].to_numpy(dtype=np.float64)
+        places = view_of(gnss, GEODETIC)
         origin, newest = fixes.origin, int(placed[-1])
         if origin is None:
             ahead = found.velocity * (self.imu.index[-1] - stamps[newest])
@@ -903,7 +902,7 @@ class CourseFit:
         fast = fixes.only(fixes.fast & fixes.independent())
         if len(fast.time) < 3:
             return bias, sd
-        mean = self.imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64).mean(axis=0)
+        mean = view_of(self.imu, [*GYRO, *ACCEL]).mean(axis=0)
         down = -mean[3:] / np.linalg.norm(mean[3:])
         course = np.unwrap(np.arctan2(fast.velocity[:, 1], fast.velocity[:, 0]))
         length = float(fast.time[-1] - fast.time[0])
@@ -912,7 +911,7 @@ class CourseFit:
         return (found, found_sd) if found_sd < sd else (bias, sd)
 
     def _part(self, begin: float) -> CourseFit:
-        time = self.imu.index.to_numpy(dtype=np.float64)
+        time = index_of(self.imu)
         fixes = self.fixes.only(self.fixes.time >= begin - 1e-9)
         first = max(int(np.searchsorted(time, fixes.time[0], side="right")) - 1, 0)
         for rest in self.rests:
@@ -1029,7 +1028,7 @@ HEADING_SPAN = 5.0
 
 def _placed(gnss: pd.DataFrame, imu: pd.DataFrame) -> Indices:
     """Rows of the fixes with a position within the samples."""
-    stamps = gnss.index.to_numpy(dtype=np.float64)
+    stamps = index_of(gnss)
     within = (stamps >= imu.index[0]) & (stamps <= imu.index[-1])
     return np.flatnonzero(usable(gnss, POSITION_SD) & within)
 

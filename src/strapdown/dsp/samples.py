@@ -205,14 +205,16 @@ def running_integral(time: Array, values: Array, *, means: bool = False) -> Arra
     The trapezoids equal `scipy.integrate.cumulative_trapezoid` to the last bit; importing that
     takes a fifth of a second, for every log with velocities.
     """
-    out = np.zeros(values.shape)
+    out = np.empty(values.shape)
+    out[0] = 0.0
     columns, sums = values.reshape(len(out), -1), out.reshape(len(out), -1)
     # Part by part: a long log takes a large part of the memory.
     rows = max(AT_ONCE // max(columns.shape[1], 1), 1)
     for at in range(0, len(out) - 1, rows):
         part = columns[at : at + rows + 1]
-        steps = part[1:] if means else 0.5 * (part[1:] + part[:-1])
-        steps = steps * np.diff(time[at : at + rows + 1])[:, None]
+        lengths = np.diff(time[at : at + rows + 1])[:, None]
+        # Half of a length is exact.
+        steps = part[1:] * lengths if means else (part[1:] + part[:-1]) * (0.5 * lengths)
         if at:
             steps[0] += sums[at]
         np.cumsum(steps, axis=0, out=sums[at + 1 : at + rows + 1])
