@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -48,6 +49,8 @@ BEGINS, ENDS = 60.0, 10.0
 #: Passes over the steps, each with the sizes of the last; share of fixed solutions that are gross
 #: errors; median of chi-square of three components; chance below which a solution is fixed.
 PASSES, GROSS, CHI_MEDIAN, UNLIKELY = 10, 0.02, 2.366, 0.1
+#: Logarithm of the least chance of a way beside the likeliest: products of two are numbers.
+LEAST_CHANCE = -300.0
 #: Largest share of the record in which positions are not the usual ones.
 MOST = 0.5
 TINY = 1e-9
@@ -103,6 +106,34 @@ class Wrong:
         return out
 
 
+class FixSteps(NamedTuple):
+    """By how much positions move from fix to fix beyond the motion of a solution.
+
+    Attributes
+    ----------
+    table : DataFrame
+        Gnss table.
+    aid : Gnss
+        Receiver.
+    rows : ndarray, (n,)
+        Of the table that are used; none of a receiver without positions, or with few.
+    at : ndarray, (n,), s
+        Their instants.
+    steps : ndarray, (n - 1, 3), m
+        North, east, down, beyond those before and those after, between which is that of a velocity
+        of the solution that changes.
+    stated : ndarray, (n - 1, 3), m
+        Their standard deviation, by those stated.
+    """
+
+    table: pd.DataFrame
+    aid: Gnss
+    rows: NDArray[np.intp]
+    at: Array
+    steps: Array
+    stated: Array
+
+
 def wrong_stretches(
     innovations: Mapping[str, pd.DataFrame], tables: Mapping[str, pd.DataFrame]
 ) -> tuple[Wrong, ...]:
@@ -143,9 +174,7 @@ def wrong_stretches(
     return tuple(sorted(found, key=lambda one: one.begin))
 
 
-def displaced_stretches(
-    record: NavigationRecord, table: pd.DataFrame, aid: Gnss
-) -> tuple[tuple[tuple[float, float], ...], float]:
+def displaced_stretches(steps_of: FixSteps) -> tuple[tuple[tuple[float, float], ...], float]:
     """Return stretches of positions that jump away and back by the same, as `Gnss.displaced`.
 
     What a position moved from one fix to the next beyond the velocity of the solution is a jump of
@@ -154,22 +183,13 @@ def displaced_stretches(
     the next one back are a gross error of one fix, which the update rule rejects: but not of the
     first ones after an outage, which it cannot tell, and from which it then rejects all others.
 
-    Parameters
-    ----------
-    record : NavigationRecord
-        Of a run over the fixes.
-    table : DataFrame
-        Gnss table.
-    aid : Gnss
-        Receiver.
-
     Returns
     -------
     stretches : tuple of pairs of float, s
     size : float, m
         Largest of their displacements.
     """
-    rows, at, steps, stated = _steps(record, table, aid)
+    table, _, rows, at, steps, stated = steps_of
     if not len(rows):
         return (), 0.0
     scatter = MAD_TO_SD * np.median(np.abs(steps), axis=0)
@@ -198,9 +218,7 @@ def displaced_stretches(
     return tuple(stretches), size
 
 
-def stated_floats(
-    record: NavigationRecord, table: pd.DataFrame, aid: Gnss
-) -> tuple[pd.DataFrame, Gnss] | None:
+def stated_floats(steps_of: FixSteps) -> tuple[pd.DataFrame, Gnss] | None:
     """State the float solutions of a receiver that does not, or understates them, by their motion.
 
     A receiver that loses its carrier-phase ambiguities jumps to a position with an error of another
@@ -209,11 +227,6 @@ def stated_floats(
     float ones, and from one to the other. Where it is not stated which is which, the chances of the
     two kinds (forward and backward: Rabiner 1989, Proc. IEEE 77) and the sizes are found in turn.
 
-    Parameters
-    ----------
-    record, table, aid
-        As of `displaced_stretches`.
-
     Returns
     -------
     table : DataFrame
@@ -221,7 +234,7 @@ def stated_floats(
     aid : Gnss
         With the `float_position_sd` that separates them. None where there are none, or as stated.
     """
-    rows, at, steps, stated = _steps(record, table, aid)
+    table, aid, rows, at, steps, stated = steps_of
     if not len(rows):
         return None
     usual = np.maximum(MAD_TO_SD * np.median(np.abs(steps), axis=0), TINY)
@@ -306,42 +319,51 @@ def _chance_of_floats(square: Array, dt: Array, looser: float, apart: float) -> 
     ways = np.empty((len(dt), 2, 2))
     ways[:, 0, 0], ways[:, 0, 1] = fixed + np.log1p(-begin), change + np.log(begin)
     ways[:, 1, 0], ways[:, 1, 1] = change + np.log(end), likely(looser) + np.log1p(-end)
-    ways = np.exp(ways - ways.max(axis=(1, 2), keepdims=True))
-    before, after = np.empty((len(dt) + 1, 2)), np.ones((len(dt) + 1, 2))
-    before[0] = 1.0, ENDS / BEGINS
-    for k, way in enumerate(ways):
-        before[k + 1] = before[k] @ way
-        before[k + 1] /= before[k + 1].sum()
-    for k in range(len(ways) - 1, -1, -1):
-        after[k] = ways[k] @ after[k + 1]
-        after[k] /= after[k].sum()
+    ways = np.exp(np.maximum(ways - ways.max(axis=(1, 2), keepdims=True), LEAST_CHANCE))
+    before = _along(ways, (1.0, ENDS / BEGINS))
+    after = _along(ways[::-1].transpose(0, 2, 1), (1.0, 1.0))[::-1]
     both = before * after
     return np.asarray(both[:, 1] / both.sum(axis=1))
 
 
-def _steps(
-    record: NavigationRecord, table: pd.DataFrame, aid: Gnss
-) -> tuple[NDArray[np.intp], Array, Array, Array]:
-    """By how much positions move from fix to fix beyond the motion of a solution.
+def _along(ways: Array, begin: tuple[float, float]) -> Array:
+    """Chances of two kinds at each of n + 1 instants by the way to it, (n + 1, 2).
 
-    Returns
-    -------
-    rows : ndarray, (n,)
-        Of the table that are used; none of a receiver without positions, or with few.
-    at : ndarray, (n,), s
-        Their instants.
-    steps : ndarray, (n - 1, 3), m
-        North, east, down, beyond those before and those after, between which is that of a velocity
-        of the solution that changes.
-    stated : ndarray, (n - 1, 3), m
-        Their standard deviation, by those stated.
+    By blocks, all at once: first of each from either kind, (blocks, length, 2, 2).
+    """
+    count = math.isqrt(len(ways)) + 1
+    size = -(-len(ways) // count)
+    blocks = np.resize(np.eye(2), (count, size, 2, 2))
+    blocks.reshape(-1, 2, 2)[: len(ways)] = ways
+    for k in range(1, size):
+        blocks[:, k] = blocks[:, k - 1] @ blocks[:, k]
+        blocks[:, k] /= blocks[:, k].sum(axis=(1, 2), keepdims=True)
+    begun = [np.array(begin)]
+    for whole in blocks[:, -1]:
+        own = begun[-1] @ whole
+        begun.append(own / own.sum())
+    out = np.einsum("bi,bkij->bkj", np.array(begun[:-1]), blocks).reshape(-1, 2)
+    return np.vstack([begun[0], out[: len(ways)]])
+
+
+def fix_steps(record: NavigationRecord, table: pd.DataFrame, aid: Gnss) -> FixSteps:
+    """Return by how much positions move from fix to fix beyond the motion of a solution.
+
+    Parameters
+    ----------
+    record : NavigationRecord
+        Of a run over the fixes.
+    table : DataFrame
+        Gnss table.
+    aid : Gnss
+        Receiver.
     """
     own = record.trajectory
     at = index_of(table) - aid.time_offset
     used = usable(table, POSITION_SD) & np.isin(table["quality"], aid.qualities)
     rows = np.flatnonzero(used & (at >= own.index[0]) & (at <= own.index[-1]))
     if len(rows) < 4 * BESIDE or not aid.use_position:
-        return rows[:0], at[:0], np.empty((0, 3)), np.empty((0, 3))
+        return FixSteps(table, aid, rows[:0], at[:0], np.empty((0, 3)), np.empty((0, 3)))
     place, at = values_of(table, GEODETIC)[rows], at[rows]
     way, told = _way(record, at, np.asarray(aid.lever_arm))
     steps = place_difference(place[1:], place[:-1]) - np.diff(way, axis=0)
@@ -352,7 +374,7 @@ def _steps(
     sd = aid.position_sd_factor * values_of(table, POSITION_SD)[rows]
     slip = np.where(told[:, None], 0.0, _slip(record, at, float(np.linalg.norm(aid.lever_arm))))
     stated = np.sqrt(np.square(sd[1:]) + np.square(sd[:-1]) + np.square(slip))
-    return rows, at, steps, stated
+    return FixSteps(table, aid, rows, at, steps, stated)
 
 
 def _paired(jumps: list[int], steps: Array, allowed: Array) -> list[tuple[int | None, int]]:

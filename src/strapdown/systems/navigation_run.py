@@ -70,6 +70,7 @@ from strapdown.navigation.record import (
 from strapdown.navigation.recorder import Recorder
 from strapdown.navigation.recovery import (
     displaced_stretches,
+    fix_steps,
     longest,
     stated_floats,
     wrong_stretches,
@@ -568,8 +569,8 @@ def _jumping(
     record: NavigationRecord, table: pd.DataFrame, aid: Gnss
 ) -> Iterator[tuple[Gnss, pd.DataFrame, Finding]]:
     """What positions that jump may be: a receiver that knows it, its fixes, and the finding."""
-    file = source_of(table)
-    stated = stated_floats(record, table, aid)
+    file, steps = source_of(table), fix_steps(record, table, aid)
+    stated = stated_floats(steps)
     if stated is not None:
         changed = values_of(stated[0], POSITION_SD) > values_of(table, POSITION_SD)
         floats = index_of(table)[changed.any(axis=1)]
@@ -583,8 +584,10 @@ def _jumping(
             last=float(floats[-1]),
         )
         yield stated[1], stated[0], finding
-    found, size = displaced_stretches(record, table, aid)
-    if found and not aid.displaced:
+    if aid.displaced:
+        return
+    found, size = displaced_stretches(steps)
+    if found:
         finding = Finding(
             "navigation.run-again-with-displacement",
             file=file,

@@ -19,6 +19,7 @@ from strapdown.navigation.recovery import (
     PARTS,
     Wrong,
     displaced_stretches,
+    fix_steps,
     longest,
     stated_floats,
     wrong_stretches,
@@ -344,7 +345,7 @@ def test_positions_that_are_displaced_any_cut_gives_the_same_bits():
 
 def seen(table, aid=None, slip=0.0):
     """Stretches that are found beside a solution whose velocity is off by a constant, m/s."""
-    return displaced_stretches(solution(slip), table, aid or town.gnss())[0]
+    return displaced_stretches(fix_steps(solution(slip), table, aid or town.gnss()))[0]
 
 
 def solution(slip=0.0):
@@ -427,7 +428,7 @@ def test_what_a_correction_of_the_solution_moves_is_no_jump(every, until, sd, fo
         VN=0.02, VE=0.02, VD=0.02
     )
     record = SimpleNamespace(trajectory=trajectory, innovations={"gnss.position": told}, sd=marks)
-    stretches, _ = displaced_stretches(record, table, Gnss(name="gnss", lever_arm=arm))
+    stretches, _ = displaced_stretches(fix_steps(record, table, Gnss(name="gnss", lever_arm=arm)))
     assert [int(one[0]) for one in stretches] == found
 
 
@@ -498,7 +499,7 @@ def test_float_solutions_that_nothing_states_are_found_by_how_they_move(hz, shar
     found, size = np.zeros((2, 2)), []
     for seed in range(20):
         table, loose = carrier_phase(seed, *LOOSE, hz=hz)
-        out, aid = stated_floats(solution(), table, town.gnss())
+        out, aid = stated_floats(fix_steps(solution(), table, town.gnss()))
         given = (out[POSITION_SD] > table[POSITION_SD]).any(axis=1).to_numpy()
         found += [[(given & loose).sum(), loose.sum()], [(given & ~loose).sum(), (~loose).sum()]]
         size.append(out.loc[given, POSITION_SD].iloc[0].to_numpy())
@@ -514,9 +515,9 @@ def test_float_solutions_that_nothing_states_are_found_by_how_they_move(hz, shar
 def test_fixes_of_one_kind_are_not_divided():
     """Sound ones, displaced by a constant, gross errors, errors that last, and what is stated."""
     for seed in range(10):
-        assert stated_floats(solution(), displaced(seed=seed), town.gnss()) is None
+        assert stated_floats(fix_steps(solution(), displaced(seed=seed), town.gnss())) is None
         table, _ = carrier_phase(seed, lasting=0.5)
-        assert stated_floats(solution(), table, town.gnss()) is None
+        assert stated_floats(fix_steps(solution(), table, town.gnss())) is None
     for table in (
         displaced((40.0, 80.0, FAULT), (120.0, 130.0, -0.4 * FAULT)),
         displaced(*((t, t + 0.6, FAULT * (-1) ** t) for t in range(20, 160, 13))),
@@ -524,10 +525,10 @@ def test_fixes_of_one_kind_are_not_divided():
         carrier_phase(0, (10.0, 100.0), (110.0, 160.0))[0],
         carrier_phase(0, *LOOSE)[0].iloc[:10],
     ):
-        assert stated_floats(solution(), table, town.gnss()) is None
+        assert stated_floats(fix_steps(solution(), table, town.gnss())) is None
     table, _ = carrier_phase(0, *LOOSE)
     for aid in (town.gnss(float_position_sd=0.1), town.gnss(use_position=False)):
-        assert stated_floats(solution(), table, aid) is None
+        assert stated_floats(fix_steps(solution(), table, aid)) is None
 
 
 def test_float_solutions_that_nothing_states_do_not_pull_the_solution():
@@ -560,12 +561,12 @@ def test_float_solutions_that_are_understated_are_stated_by_how_they_jump(part):
         table, loose = carrier_phase(seed, *LOOSE)
         table.loc[loose, POSITION_SD] = part * FLOAT_SD
         aid = town.gnss(float_position_sd=2.0 * FIXED_SD)
-        found = stated_floats(solution(), table, aid)
+        found = stated_floats(fix_steps(solution(), table, aid))
         if found is None:
             continue
         out, same = found
         assert same == aid
-        assert stated_floats(solution(), out, same) is None
+        assert stated_floats(fix_steps(solution(), out, same)) is None
         pd.testing.assert_frame_equal(out[~loose], table[~loose])
         sizes.append(out.loc[loose, POSITION_SD].to_numpy().mean() / FLOAT_SD)
     if part == 1.0:
@@ -578,4 +579,7 @@ def test_float_solutions_that_are_understated_are_stated_by_how_they_jump(part):
 def test_two_stretches_of_float_solutions_do_not_show_their_size():
     table, loose = carrier_phase(0, LOOSE[0], LOOSE[2])
     table.loc[loose, POSITION_SD] = 0.25 * FLOAT_SD
-    assert stated_floats(solution(), table, town.gnss(float_position_sd=2.0 * FIXED_SD)) is None
+    assert (
+        stated_floats(fix_steps(solution(), table, town.gnss(float_position_sd=2.0 * FIXED_SD)))
+        is None
+    )
