@@ -82,7 +82,7 @@ from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.inputs import Memory, SavedRun, configuration_file
-from strapdown.systems.named_sensor import unlike_sensor
+from strapdown.systems.named_sensor import GRADES, unlike_sensor
 from strapdown.systems.navigation_checks import channel_findings, look_through, saturated_findings
 from strapdown.systems.navigation_proposal import quiet_at_start
 from strapdown.systems.navigation_source import (
@@ -109,8 +109,8 @@ Drive = Callable[..., PipelineRun]
 LEAST_LOST = 1.0
 #: Shares of a whole run at which its pipeline begins and ends.
 BEGUN, ENDED = 0.15, 0.8
-#: Grades of sensors, the best first; one is coarser than a sensor by this factor of its gyro bias.
-GRADES, COARSER = ("tactical-grade", "industrial-grade", "consumer-grade"), 3.0
+#: Grades that may explain a contradiction: coarser than the sensor by this factor of its gyro bias.
+COARSE, COARSER = GRADES[1:], 3.0
 #: How often a run is repeated at most that is contradicted for longer than receivers are at fault.
 RECOVERIES = 4
 #: By how many of its standard deviations an estimated time offset over `CONTINUED` differs from
@@ -707,11 +707,11 @@ def _coarser(
 ) -> list[tuple[str, NavigationPipeline]]:
     """Pipelines with coarser grades of sensors than the one that is named, the best first."""
     named = spec.sensors.sensor
-    if named is None or named in GRADES:
+    if named is None or named in COARSE:
         return []
     bias = max(sensors.gyro.axis("bias"))
     out = []
-    for grade in GRADES:
+    for grade in COARSE:
         if max(ImuUncertainty.of_sensor(load_sensor(grade)).gyro.axis("bias")) > COARSER * bias:
             update = {"sensor": grade, "states": None}
             table = spec.sensors.model_copy(update=update)
