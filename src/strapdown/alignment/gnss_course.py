@@ -968,8 +968,18 @@ def _solve(
     normal = half.T @ half
     normal[np.diag_indices(len(sd))] += 1.0
     size = 1.0 / np.sqrt(np.diagonal(normal))
-    inverse = _inverse_of_lower(np.linalg.cholesky(size[:, None] * normal * size)) * size
+    inverse = _root_of_inverse(size[:, None] * normal * size) * size
     return (right @ inverse.T) @ inverse, inverse, float(len(sd) - np.square(inverse).sum())
+
+
+def _root_of_inverse(matrix: Array) -> Array:
+    """R, with R'R the inverse of a positive matrix, which rounding may make singular."""
+    try:
+        return _inverse_of_lower(np.linalg.cholesky(matrix))
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(matrix)
+        least = len(matrix) * float(np.finfo(np.float64).eps)
+        return np.asarray((vectors / np.sqrt(np.maximum(values, least))).T)
 
 
 #: Rows up to which a triangle is inverted as any other matrix.
@@ -979,7 +989,7 @@ SMALL_TRIANGLE = 24
 def _inverse_of_lower(lower: Array) -> Array:
     """Inverse of a lower triangular matrix, by halves: numpy has that of any matrix alone."""
     if len(lower) <= SMALL_TRIANGLE:
-        return np.linalg.inv(lower)
+        return np.asarray(np.linalg.inv(lower))
     half, out = len(lower) // 2, np.zeros_like(lower)
     out[:half, :half] = _inverse_of_lower(lower[:half, :half])
     out[half:, half:] = _inverse_of_lower(lower[half:, half:])

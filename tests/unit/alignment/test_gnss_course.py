@@ -19,7 +19,7 @@ from stands import ORIGIN, SITE, chi_square, ideal, phi, still, unit
 
 from strapdown import rotation
 from strapdown.alignment.course_sums import ARM, END_VELOCITY, OF_SENSORS, TURN, Antenna
-from strapdown.alignment.gnss_course import GnssCourse, _excess
+from strapdown.alignment.gnss_course import SMALL, GnssCourse, _excess, _root_of_inverse
 from strapdown.errors import ConfigError, DataError
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.navigator import Warming
@@ -518,6 +518,24 @@ def test_heights_give_a_course_receiver_its_vertical_velocity():
     down = np.interp(40.0, exact.index, exact["VD"])
     assert found.velocity[2] == pytest.approx(down, abs=0.02)
     assert found.joint[2, 2] < 0.05**2
+
+
+def test_a_root_of_the_inverse_stays_finite_where_rounding_makes_the_matrix_singular():
+    normal = np.cov(np.random.default_rng(5).normal(size=(80, 200)))
+    root = _root_of_inverse(normal)
+    assert np.abs(root.T @ root @ normal - np.eye(80)).max() < 1e-12
+    assert np.isfinite(_root_of_inverse(np.ones((80, 80)))).all()
+
+
+def test_a_search_from_a_near_estimate_ends_where_one_from_nothing_does():
+    imu, _ = ideal(DRIVE, 50.0)
+    sensors = ImuUncertainty(TriadUncertainty(bias=1e-2), TriadUncertainty(bias=0.3))
+    fit = GnssCourse().fit(imu.iloc[:2001], SITE, sensors, fixes(1, rate=3.7), Antenna())
+    found = fit.search()
+    again = fit.search(found)
+    moved = np.concatenate([again.velocity - found.velocity, again.bias - found.bias])
+    sd = np.sqrt(np.diagonal(found.covariance)[[0, 1, 2, *range(6, 12)]])
+    assert (np.abs(moved) < SMALL * sd).all()
 
 
 @pytest.mark.parametrize("positions", [False, True])
