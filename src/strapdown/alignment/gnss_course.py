@@ -975,7 +975,7 @@ def _solve(
 def _root_of_inverse(matrix: Array) -> Array:
     """R, with R'R the inverse of a positive matrix, which rounding may make singular."""
     try:
-        return _inverse_of_lower(np.linalg.cholesky(matrix))
+        return _inverse_of_lower(np.asarray(np.linalg.cholesky(matrix), dtype=np.float64))
     except np.linalg.LinAlgError:
         values, vectors = np.linalg.eigh(matrix)
         least = len(matrix) * float(np.finfo(np.float64).eps)
@@ -989,7 +989,7 @@ SMALL_TRIANGLE = 24
 def _inverse_of_lower(lower: Array) -> Array:
     """Inverse of a lower triangular matrix, by halves: numpy has that of any matrix alone."""
     if len(lower) <= SMALL_TRIANGLE:
-        return np.asarray(np.linalg.inv(lower))
+        return np.asarray(np.linalg.inv(lower), dtype=np.float64)
     half, out = len(lower) // 2, np.zeros_like(lower)
     out[:half, :half] = _inverse_of_lower(lower[:half, :half])
     out[half:, half:] = _inverse_of_lower(lower[half:, half:])
