@@ -532,14 +532,14 @@ def _with_jumps(
             continue
         before, least = run, LEAST_GAIN
         best: tuple[NavigationPipeline, NavigationSource, Finding] | None = None
+        known: list[tuple[Gnss, pd.DataFrame]] = []
         for _ in range(2):  # beside the repeated run, what jumps is clearer
             for other, table, finding in list(_jumping(run.record, source.tables[aid.name], aid)):
+                if any(other == one and table.equals(its) for one, its in known):
+                    continue
+                known.append((other, table))
                 tables = {**source.tables, aid.name: table}
                 tried = with_aid(chain, other), replace(source, tables=tables)
-                if best is not None and (
-                    other in best[0].navigator.aids and table.equals(best[1].tables[aid.name])
-                ):
-                    continue  # as before
                 try:
                     again = drive(*tried)
                 except DivergenceError:
@@ -583,17 +583,18 @@ def _jumping(
             last=float(floats[-1]),
         )
         yield stated[1], stated[0], finding
-    found, size = displaced_stretches(record, table, aid)
-    if found and not aid.displaced:
-        finding = Finding(
-            "navigation.run-again-with-displacement",
-            file=file,
-            quantity="lat, lon, alt",
-            size=size,
-            listed=[f"{begin:.5g} to {end:.5g} s" for begin, end in found],
-            given=str([[round(x, 3) for x in one] for one in found]),
-        )
-        yield replace(aid, displaced=found), table, finding
+    for hidden in (False, True):
+        found, size = displaced_stretches(record, table, aid, hidden=hidden)
+        if found and not aid.displaced:
+            finding = Finding(
+                "navigation.run-again-with-displacement",
+                file=file,
+                quantity="lat, lon, alt",
+                size=size,
+                listed=[f"{begin:.5g} to {end:.5g} s" for begin, end in found],
+                given=str([[round(x, 3) for x in one] for one in found]),
+            )
+            yield replace(aid, displaced=found), table, finding
 
 
 def _recovered(
