@@ -172,9 +172,7 @@ def blame(
         One; none where no hypothesis explains the measurements much better than the run, or where
         these are not so far from it that one could.
     """
-    count = _count(record)
-    # Of what one leaves half at most, half is to be enough.
-    if misfit(record) < _enough(count) / LEAVES:
+    if not contradicted(record):
         return ()
     stretch = _worst(record, chain)
     bench = _Bench(asked, chain, imu, tables, record, progress)
@@ -199,6 +197,14 @@ def blame(
     if not tested or tested[0].left >= allowed or tested[0].gain < _enough(tested[0].count):
         return ()
     return (_named(tested, bench, aid),)
+
+
+def contradicted(record: NavigationRecord) -> bool:
+    """Whether fixes are so far from a run that an explanation could be much better.
+
+    Of what one leaves half at most, half is to be enough.
+    """
+    return misfit(record) >= _enough(_count(record)) / LEAVES
 
 
 def misfit(record: NavigationRecord) -> float:
@@ -285,7 +291,7 @@ class _Bench:
         except StrapdownError:
             return []
         own, its = (
-            _by_stamp(x.innovations, c) for x, c in ((self.record, self.chain), (record, one.chain))
+            by_stamp(x.innovations, c) for x, c in ((self.record, self.chain), (record, one.chain))
         )
         gain, count = likelihood_gain(own, its)
         if count < COMMON * _count(self.record):
@@ -472,7 +478,7 @@ def _of_aid(record: NavigationRecord, aid: Gnss) -> list[pd.DataFrame]:
     return [t for name, t in record.innovations.items() if name.rpartition(".")[0] == aid.name]
 
 
-def _by_stamp(
+def by_stamp(
     innovations: Mapping[str, pd.DataFrame], chain: NavigationPipeline
 ) -> dict[str, pd.DataFrame]:
     """Innovations by the stamps of their fixes: their instants are those of a clock in doubt."""

@@ -174,7 +174,9 @@ def wrong_stretches(
     return tuple(sorted(found, key=lambda one: one.begin))
 
 
-def displaced_stretches(steps_of: FixSteps) -> tuple[tuple[tuple[float, float], ...], float]:
+def displaced_stretches(
+    steps_of: FixSteps, *, hidden: bool = False
+) -> tuple[tuple[tuple[float, float], ...], float]:
     """Return stretches of positions that jump away and back by the same, as `Gnss.displaced`.
 
     What a position moved from one fix to the next beyond the velocity of the solution is a jump of
@@ -182,6 +184,12 @@ def displaced_stretches(steps_of: FixSteps) -> tuple[tuple[tuple[float, float], 
     are displaced by a constant; the longer part of the record is taken for what is not. A jump and
     the next one back are a gross error of one fix, which the update rule rejects: but not of the
     first ones after an outage, which it cannot tell, and from which it then rejects all others.
+
+    Parameters
+    ----------
+    hidden : bool
+        One of both jumps may be in an outage, or beyond the record: those between it and the other
+        jump, before or after, whichever lasts shorter, are displaced then.
 
     Returns
     -------
@@ -202,16 +210,23 @@ def displaced_stretches(steps_of: FixSteps) -> tuple[tuple[tuple[float, float], 
     found, size = list[tuple[int, int]](), 0.0
     for first, last in _paired(np.flatnonzero(struck & (beside == 0)).tolist(), steps, allowed):
         if first is None:
-            # Of the first ones after an outage nothing before shows whether they are right.
-            begin = max(one for one in begins if one <= last)
-            if last - begin < FEWEST - 1:
-                found.append((begin, last + 1))
-                size = max(size, float(np.linalg.norm(steps[last])))
+            jump = float(np.linalg.norm(steps[last]))
+            # What an outage made of the solution is part of the step over it.
+            hides = [k for k in begins[1:] if np.linalg.norm(steps[k - 1]) > ALIKE * jump]
+            begin = max(k for k in (0, *hides) if k <= last)
+            end = min((k for k in hides if k > last), default=len(rows))
+            away = (begin, last + 1), (last + 1, end)
+            shorter = min(away, key=lambda one: at[one[1] - 1] - at[one[0]])
+            apart = all(shorter[1] <= one[0] or one[1] <= shorter[0] for one in found)
+            if apart and (hidden or (shorter == away[0] and last - begin < FEWEST - 1)):
+                found.append(shorter)
+                size = max(size, jump)
         elif last - first >= FEWEST:
             found = [one for one in found if one[1] <= first] + [(first + 1, last + 1)]
             size = max(size, float(np.linalg.norm(0.5 * (steps[first] - steps[last]))))
     stamps = index_of(table)[rows]
     middle = 0.5 * (stamps + np.append(stamps[0], stamps[:-1]))
+    middle = np.append(middle, 2.0 * stamps[-1] - middle[-1])
     stretches = [(float(middle[begin]), float(middle[end])) for begin, end in sorted(found)]
     if sum(end - begin for begin, end in stretches) > MOST * (stamps[-1] - stamps[0]):
         return (), 0.0

@@ -38,7 +38,7 @@ from strapdown.evaluation.trajectory_differences import (
     trajectory_differences,
 )
 from strapdown.nav_state import NavState
-from strapdown.navigation.blame import CONTINUED, blame
+from strapdown.navigation.blame import CONTINUED, blame, by_stamp, contradicted
 from strapdown.navigation.filter_options import DAMPINGS
 from strapdown.navigation.integrity import (
     GAIN_EACH,
@@ -48,7 +48,7 @@ from strapdown.navigation.integrity import (
     likelihood_gain,
     rejected_percent,
 )
-from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.gnss import LARGEST_OFFSET, Gnss
 from strapdown.navigation.measurements.measurement import Measurement
 from strapdown.navigation.modes import (
     CoarseMode,
@@ -121,6 +121,8 @@ SETTLED = 0.01
 #: How often at most: by a second, states of sensors take a part of it, and each run finds some of
 #: the rest, of which the part found is taken to be at least the second.
 STEPS_OF_OFFSET, LEAST_PART = 10, 0.25
+#: Other offsets that a run is begun with, in standard deviations of what is assumed.
+STARTS = (-2.0, -1.0, 1.0, 2.0)
 #: A run is repeated with the offset that it found, known to so many of its standard deviations,
 #: where that is at most this part of what was assumed, and where the assumed one moves the vehicle,
 #: at the speed that is exceeded for a tenth of the time, by so many standard deviations of fixes.
@@ -206,12 +208,9 @@ def run_navigation(
     asked = chain
     with said_of_file(*tables):
         run = again(chain)
-        chain, run, by_offset = _with_settled_offsets(chain, run, again)
-        chain, run, source, by_jumps = _with_jumps(chain, run, source, again)
+        chain, run, source, by_offset, by_jumps = _explained(chain, run, source, again)
         if by_jumps:
             asked = _with_jumps_of(chain, asked)
-            chain, run, more = _with_settled_offsets(chain, run, again)
-            by_offset += more
         begun_with = chain
         if not by_offset and run.smoothed is None:
             chain, by_offset = _with_known_offsets(chain, run.record, source.tables)
@@ -417,31 +416,116 @@ def _turns(euler: NDArray[np.float64]) -> NDArray[np.float64]:
     )
 
 
+def _explained(
+    chain: NavigationPipeline,
+    run: PipelineRun,
+    source: NavigationSource,
+    drive: Callable[..., PipelineRun],
+) -> tuple[
+    NavigationPipeline, PipelineRun, NavigationSource, tuple[Finding, ...], tuple[Finding, ...]
+]:
+    """Repeat a run with what its fixes show: time offsets, and positions that jump.
+
+    Positions that are displaced while a body begins to move look like an offset, and beside a run
+    with that offset they are not found. Where there is one, what jumps beside the first run is the
+    other hypothesis: the likelier of both stays.
+    """
+    first = chain, run, source
+    chain, run, by_offset = _with_settled_offsets(chain, run, drive)
+    chain, run, source, by_jumps = _with_jumps(chain, run, source, drive)
+    if by_jumps:
+        chain, run, _ = _with_settled_offsets(chain, run, partial(drive, other_source=source))
+        by_offset = _by_offset(first[0], chain, run)
+    if by_offset:
+        other, again, changed, jumps = _with_jumps(*first, drive)
+        if jumps:
+            over = partial(drive, other_source=changed)
+            other, again, offsets = _with_settled_offsets(other, again, over)
+            if _gain(chain, run, other, again) > 0.0:
+                return other, again, changed, offsets, jumps
+    return chain, run, source, by_offset, by_jumps
+
+
+def _gain(
+    chain: NavigationPipeline, run: PipelineRun, other: NavigationPipeline, again: PipelineRun
+) -> float:
+    """By how much another run explains the same fixes better, as `likelihood_gain`."""
+    own = by_stamp(run.record.innovations, chain)
+    return likelihood_gain(own, by_stamp(again.record.innovations, other))[0]
+
+
 def _with_settled_offsets(
     chain: NavigationPipeline, run: PipelineRun, drive: Callable[[NavigationPipeline], PipelineRun]
 ) -> tuple[NavigationPipeline, PipelineRun, tuple[Finding, ...]]:
     """Repeat a run with the time offsets that it estimates until these are small.
 
-    One that leads to where there is no run, as no fix is left within the alignment, is not known:
-    the first run stays.
+    The likeliest run stays. One whose offset is that of a wrong clock, or leads to where there is
+    no run, as no fix is left within the alignment, is none.
     """
-    asked = chain, run
-    findings: tuple[Finding, ...] = ()
+    asked = chain
+    best = _with_likeliest_start(chain, run, drive)
+    tried, again = best
     before: dict[str, tuple[float, float]] = {}
-    for step in range(STEPS_OF_OFFSET + 1):
-        other, left = _with_offsets(chain, run.smoothed or run.record, before)
-        if not left or step == STEPS_OF_OFFSET:
+    for _ in range(STEPS_OF_OFFSET):
+        tried, left = _with_offsets(tried, again.smoothed or again.record, before)
+        if not left or any(abs(one.data["offset"]) > LARGEST_OFFSET for one in left):
             break
         try:
-            run = drive(other)
+            again = drive(tried)
         except (DataError, DivergenceError):
-            (chain, run), findings = asked, ()
             break
-        chain, findings = other, left
-    code = "navigation.offset-not-settled"
+        if _gain(*best, tried, again) > -LEAST_GAIN:
+            best = tried, again
+    return (*best, _by_offset(asked, *best))
+
+
+def _by_offset(
+    asked: NavigationPipeline, chain: NavigationPipeline, run: PipelineRun
+) -> tuple[Finding, ...]:
+    """Report the time offsets with which a run was repeated, and those that did not settle."""
+    findings: list[Finding] = []
+    record, before = run.smoothed or run.record, dict[str, tuple[float, float]]()
+    for aid, own in zip(chain.navigator.aids, asked.navigator.aids, strict=True):
+        if isinstance(aid, Gnss) and isinstance(own, Gnss) and aid.time_offset != own.time_offset:
+            name = f"{aid.name}.time_offset_t"
+            add_note(
+                findings,
+                "navigation.run-again-with-offset",
+                quantity=name,
+                offset=aid.time_offset,
+                sd=float(record.sensors_sd[name].iloc[-1]),
+            )
+    _, left = _with_offsets(chain, record, before)
     names = [str(one.quantity) for one in left]
-    unsettled = (Finding(code, quantity=name, left=before[name][1]) for name in names)
-    return chain, run, (*findings, *unsettled)
+    code = "navigation.offset-not-settled"
+    return (*findings, *(Finding(code, quantity=n, left=before[n][1]) for n in names))
+
+
+def _with_likeliest_start(
+    chain: NavigationPipeline, run: PipelineRun, drive: Callable[[NavigationPipeline], PipelineRun]
+) -> tuple[NavigationPipeline, PipelineRun]:
+    """Begin a run that its fixes contradict with the likeliest of other time offsets.
+
+    Steps of a walk, or waves, are alike every half second or few: about a wrong offset the nearest
+    estimate is another wrong one.
+    """
+    best = chain, run
+    for aid in chain.navigator.aids:
+        if not isinstance(aid, Gnss) or aid.time_offset_sd <= CONTINUED:
+            continue
+        if not contradicted(best[1].record):
+            break
+        about = best[0]
+        for step in STARTS:
+            offset = aid.time_offset + step * aid.time_offset_sd
+            other = with_aid(about, replace(aid, time_offset=offset))
+            try:
+                again = drive(other)
+            except (DataError, DivergenceError):
+                continue
+            if _gain(*best, other, again) > LEAST_GAIN:
+                best = other, again
+    return best
 
 
 def _with_offsets(
@@ -533,14 +617,14 @@ def _with_jumps(
             continue
         before, least = run, LEAST_GAIN
         best: tuple[NavigationPipeline, NavigationSource, Finding] | None = None
+        known: list[tuple[Gnss, pd.DataFrame]] = []
         for _ in range(2):  # beside the repeated run, what jumps is clearer
             for other, table, finding in list(_jumping(run.record, source.tables[aid.name], aid)):
+                if any(other == one and table.equals(its) for one, its in known):
+                    continue
+                known.append((other, table))
                 tables = {**source.tables, aid.name: table}
                 tried = with_aid(chain, other), replace(source, tables=tables)
-                if best is not None and (
-                    other in best[0].navigator.aids and table.equals(best[1].tables[aid.name])
-                ):
-                    continue  # as before
                 try:
                     again = drive(*tried)
                 except DivergenceError:
@@ -586,17 +670,18 @@ def _jumping(
         yield stated[1], stated[0], finding
     if aid.displaced:
         return
-    found, size = displaced_stretches(steps)
-    if found:
-        finding = Finding(
-            "navigation.run-again-with-displacement",
-            file=file,
-            quantity="lat, lon, alt",
-            size=size,
-            listed=[f"{begin:.5g} to {end:.5g} s" for begin, end in found],
-            given=str([[round(x, 3) for x in one] for one in found]),
-        )
-        yield replace(aid, displaced=found), table, finding
+    for hidden in (False, True):
+        found, size = displaced_stretches(steps, hidden=hidden)
+        if found:
+            finding = Finding(
+                "navigation.run-again-with-displacement",
+                file=file,
+                quantity="lat, lon, alt",
+                size=size,
+                listed=[f"{begin:.5g} to {end:.5g} s" for begin, end in found],
+                given=str([[round(x, 3) for x in one] for one in found]),
+            )
+            yield replace(aid, displaced=found), table, finding
 
 
 def _recovered(

@@ -19,6 +19,7 @@ from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.recorder import FullRecorder, _contradictions, record_of
 from strapdown.navigation.smoother import RauchTungStriebel
 from strapdown.navigation.truth_comparison import compare_with_truth
+from strapdown.systems import navigation_run
 from strapdown.systems.navigation_run import (
     ASSUMED,
     CONTINUED,
@@ -385,7 +386,9 @@ def test_runs_are_repeated_until_the_offset_they_find_is_small(part, runs):
         assumed.append(chain.navigator.aids[0].time_offset)
         error = part * (assumed[-1] - true) if part else 0.3
         record = SimpleNamespace(
-            sensors=pd.DataFrame({name: [error]}), sensors_sd=pd.DataFrame({name: [0.001]})
+            sensors=pd.DataFrame({name: [error]}),
+            sensors_sd=pd.DataFrame({name: [0.001]}),
+            innovations={},
         )
         return SimpleNamespace(smoothed=None, record=record)
 
@@ -403,12 +406,92 @@ def test_runs_are_repeated_until_the_offset_they_find_is_small(part, runs):
         assert findings[-1].data["left"] == 0.3
 
 
+def walked(sizes, left):
+    """Runs over fixes whose innovations have a size, and which estimate an offset, by the assumed.
+
+    `sizes`, `left`: functions of the assumed offset.
+    """
+    name, navigator = "gnss.time_offset_t", town.begun(town.gnss(time_offset_sd=0.2))[0]
+    labels = ("north, m", "east, m", "down, m")
+    time = np.round(np.arange(10.0, 110.0), 6)
+
+    def drive(chain):
+        offset = chain.navigator.aids[0].time_offset
+        columns = {f"nu {x}": sizes(offset) for x in labels}
+        columns |= {f"{part} {x}": 1.0 for part in ("s", "weight") for x in labels}
+        record = SimpleNamespace(
+            sensors=pd.DataFrame({name: [left(offset)]}),
+            sensors_sd=pd.DataFrame({name: [0.001]}),
+            innovations={"gnss.position": pd.DataFrame(columns, index=time - offset)},
+        )
+        return SimpleNamespace(smoothed=None, record=record)
+
+    chain = SimpleChain(navigator)
+    return _with_settled_offsets(chain, drive(chain), drive)
+
+
+def test_a_contradicted_run_is_begun_with_the_likeliest_of_several_offsets():
+    """Of a walk whose steps are alike every half second: from zero, the nearest is a wrong one."""
+    true, wrong = -0.38, 0.12
+
+    def nearest(offset):
+        return true if offset < -0.13 else wrong
+
+    def left(offset):
+        return offset - nearest(offset)
+
+    def sizes(offset):
+        return 0.5 + 10.0 * abs(left(offset)) + 3.0 * (nearest(offset) == wrong)
+
+    after, _, (finding,) = walked(sizes, left)
+    assert finding.code == "navigation.run-again-with-offset"
+    assert finding.data["offset"] == after.navigator.aids[0].time_offset
+    assert finding.data["offset"] == pytest.approx(true, abs=CONTINUED)
+
+
+@pytest.mark.parametrize(("size", "step"), [(2.0, 0.4), (0.9, 1.1)])
+def test_an_offset_with_which_fixes_are_explained_less_is_not_used(size, step):
+    """Each run finds more of it: of positions that are wrong, and of no clock."""
+    after, _, (finding,) = walked(lambda offset: size + abs(offset), lambda _: step)
+    assert after.navigator.aids[0].time_offset == 0.0
+    assert finding.code == "navigation.offset-not-settled"
+
+
+@pytest.mark.parametrize("gain", [50.0, -50.0])
+def test_what_jumps_beside_the_first_run_is_the_other_hypothesis(gain, monkeypatch):
+    """Displaced positions look like an offset, and beside a run with that they do not jump."""
+
+    def settled(chain, run, drive):
+        return f"{chain}, settled", drive(chain), () if chain == "displaced" else ("offset",)
+
+    def jumps(chain, run, source, drive):
+        if chain == "asked":
+            return "displaced", run, "changed", ("jumps",)
+        return chain, run, source, ()
+
+    monkeypatch.setattr(navigation_run, "_with_settled_offsets", settled)
+    monkeypatch.setattr(navigation_run, "_with_jumps", jumps)
+    monkeypatch.setattr(navigation_run, "_gain", lambda *_: gain)
+
+    def drive(chain, other_source="given"):
+        return chain, other_source
+
+    found = navigation_run._explained("asked", "first", "given", drive)
+    if gain > 0.0:
+        over = "displaced", "changed"
+        assert found == ("displaced, settled", over, "changed", (), ("jumps",))
+    else:
+        assert found == ("asked, settled", ("asked", "given"), "given", ("offset",), ())
+
+
 def test_an_offset_with_which_there_is_no_run_is_not_used():
     """As one by which no fix is left within the alignment."""
     navigator, _ = town.begun(town.gnss(time_offset_sd=0.2))
     chain, name = SimpleChain(navigator), "gnss.time_offset_t"
     record = SimpleNamespace(
-        sensors=pd.DataFrame({name: [1.3]}), sensors_sd=pd.DataFrame({name: [0.04]})
+        sensors=pd.DataFrame({name: [1.3]}),
+        sensors_sd=pd.DataFrame({name: [0.04]}),
+        innovations={},
     )
     first = SimpleNamespace(smoothed=None, record=record)
 

@@ -343,9 +343,47 @@ def test_positions_that_are_displaced_any_cut_gives_the_same_bits():
     np.testing.assert_array_equal(*found)
 
 
-def seen(table, aid=None, slip=0.0):
+def without(table, begin, end):
+    """Fixes with an outage."""
+    return table[(table.index < begin) | (table.index > end)]
+
+
+@pytest.mark.parametrize(
+    ("stretch", "outage", "found"),
+    [
+        ((55.0, 80.0), (45.0, 65.0), (55.0, 80.0)),
+        ((80.0, 105.0), (95.0, 115.0), (80.0, 105.0)),
+        ((120.0, 200.0), None, (120.0, 200.0)),
+        ((0.0, 20.0), None, (0.0, 20.0)),
+    ],
+)
+def test_one_of_both_jumps_may_be_in_an_outage_or_beyond_the_record(stretch, outage, found):
+    table = displaced((*stretch, FAULT))
+    if outage is not None:
+        table = without(table, *outage)
+    assert seen(table) == ()
+    (own,) = seen(table, hidden=True)
+    end = town.motion().duration
+    np.testing.assert_allclose(own, np.minimum(found, end), atol=0.6)
+    # An outage of another kind hides no jump: nothing moved over it beyond the motion.
+    (same,) = seen(without(table, 30.0, 33.0), hidden=True)
+    assert same == own
+
+
+def test_positions_that_jump_back_after_an_outage_do_not_pull_the_solution():
+    """The jump away is in the outage, in which the sensors alone do not show it."""
+    table = without(displaced((55.0, 80.0, FAULT)), 45.0, 65.0)
+    first, (_, run, _, (finding,)) = navigated(table, pushed(), step=_with_jumps)
+    assert finding.code == "navigation.run-again-with-displacement"
+    distance, bounds = off(run.record)
+    assert distance.max() < 0.2 * off(first.record)[0].max()
+    assert bounds.max() < 4.0
+
+
+def seen(table, aid=None, slip=0.0, **options):
     """Stretches that are found beside a solution whose velocity is off by a constant, m/s."""
-    return displaced_stretches(fix_steps(solution(slip), table, aid or town.gnss()))[0]
+    steps = fix_steps(solution(slip), table, aid or town.gnss())
+    return displaced_stretches(steps, **options)[0]
 
 
 def solution(slip=0.0):
