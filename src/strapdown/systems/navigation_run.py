@@ -459,17 +459,21 @@ def _with_settled_offsets(
 ) -> tuple[NavigationPipeline, PipelineRun, tuple[Finding, ...]]:
     """Repeat a run with the time offsets that it estimates until these are small.
 
-    The likeliest run stays. One whose offset is that of a wrong clock, or leads to where there is
-    no run, as no fix is left within the alignment, is none.
+    The last run stays if they are: the likelihood of one about a wrong offset is that of the biases
+    that hide it. Else the likeliest does. One whose offset is that of a wrong clock, or leads to
+    where there is no run, as no fix is left within the alignment, is none.
     """
     asked = chain
     best = _with_likeliest_start(chain, run, drive)
     tried, again = best
     before: dict[str, tuple[float, float]] = {}
     for _ in range(STEPS_OF_OFFSET):
-        tried, left = _with_offsets(tried, again.smoothed or again.record, before)
+        other, left = _with_offsets(tried, again.smoothed or again.record, before)
+        if not left:
+            best = tried, again
         if not left or any(abs(one.data["offset"]) > LARGEST_OFFSET for one in left):
             break
+        tried = other
         try:
             again = drive(tried)
         except (DataError, DivergenceError):
