@@ -305,7 +305,8 @@ def is_count(stamps: NDArray[Any]) -> bool:
 
     They number the samples as well as they are a clock of one tick a sample.
     """
-    return stamps.dtype.kind in "iu" and stamps.size > 1 and bool((np.diff(stamps) == 1).all())
+    whole = stamps.dtype.kind in "iuf" and stamps.size > 1 and float(stamps[0]).is_integer()
+    return whole and bool((np.diff(stamps) == 1).all())
 
 
 # Stamps that are coarser than the samples.

@@ -47,9 +47,9 @@ from strapdown.formats.vocabularies import (
 from strapdown.units import ACCEL_UNITS, FACTORS, OF_LOGS, find_unit, unit_of, unit_words
 
 _AXES = "xyz"
-#: Axes with a letter of the body or the vehicle: AngleRate Xv of OXTS.
 #: Axes of the body about which its angles turn: Yaw (deg/s) is a rate.
 _TURN_OF = {"roll": "x", "pitch": "y", "heading": "z"}
+#: Axes with a letter of the body or the vehicle: AngleRate Xv of OXTS.
 _FRAMED = {f"{axis}{frame}": axis for axis in _AXES for frame in "bv"}
 #: A column of an array: its name and its number.
 INDEXED = re.compile(r"(.*)\[(\d+)\]")

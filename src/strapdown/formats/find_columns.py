@@ -694,6 +694,11 @@ def _families(raw: RawLog, said: dict[str, ColumnName]) -> dict[tuple[str, str],
             out[key] = dict(zip(AXES, (names[k] for k in sorted(names)), strict=True))
     if len(out.get(("gyro", "p"), "xyz")) < 3:
         del out["gyro", "p"]
+    rates = {key: f for key, f in out.items() if key[0] == "gyro"}
+    turns = {key for key in rates if key[1].rpartition(" ")[2].rstrip("'") == "turn"}
+    if any(len(f) == len(AXES) for key, f in rates.items() if key not in turns):
+        # Beside rates, those of angles are another's: of a controller, or of the reference.
+        out = {key: f for key, f in out.items() if key not in turns}
     return out
 
 

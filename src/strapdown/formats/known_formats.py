@@ -190,7 +190,9 @@ def rows_of_kinds(raw: RawLog, *, asked: bool) -> DataError | None:
     """
     if not (asked or any(_BARE_X.fullmatch(name.strip()) for name in raw.columns)):
         return None
-    for name, _, counts in _in_turn_by(raw, _OF_SENSORS | _OF_KINDS):
+    # A number of a packet's sample is in turns, too: it is not of kinds.
+    words = _OF_KINDS if asked else _OF_SENSORS | _OF_KINDS
+    for name, _, counts in _in_turn_by(raw, words):
         kinds = [f"{kind} ({n} rows)" for kind, n in counts.items()]
         return raw.fault("io.rows-of-kinds", name=name, kinds=kinds)
     return None

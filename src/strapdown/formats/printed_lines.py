@@ -129,7 +129,7 @@ def _channels_named(numbered: Lines) -> Lines:
     channels = [_CHANNEL.fullmatch(cell.strip()) for cell in first.split(",")]
     if len(channels) < LABELS or None in channels:
         return numbered
-    said = [(m[1].replace("Interval", "time"), m[2]) for m in channels if m]
+    said = [("time" if m[1].strip() == "Interval" else m[1], m[2]) for m in channels if m]
     names = [f"{name} [{unit}]" if unit else name for name, unit in said]
     return [(numbered[0][0], ",".join(names)), *numbered[1:]]
 

@@ -7,6 +7,7 @@ import dataclasses
 import io
 import json
 import tempfile
+from collections.abc import Mapping
 from datetime import datetime, time
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -197,7 +198,7 @@ def _form(text: str) -> str:
     list of each as its ``data``.
     """
     value, end = json_beginning(text)
-    if _data_of(value):
+    if _data_of(value)[0]:
         return "streams"
     if isinstance(value, list):
         first = value[0] if value else None
@@ -235,27 +236,33 @@ def _form(text: str) -> str:
 _PAIRS = {"latlng", "latlon"}
 
 
-def _data_of(content: Any) -> dict[str, list[Any]]:
-    """Return the columns of objects that have one each as ``data``; empty if they do not.
+def _data_of(content: Any) -> tuple[dict[str, list[Any]], dict[str, str]]:
+    """Return the columns of objects that have one each as ``data``, and units; empty without.
 
     ``{"time": {"data": […], "series_type": …}, "latlng": {"data": [[…, …], …]}}`` or a list of
     such objects with their ``type``, as Strava has the streams of an activity.
     """
     held = content
     if isinstance(held, list):
-        held = {str(one.get("type")): one for one in held if isinstance(one, dict)}
+        kinds = [one.get("type") for one in held if isinstance(one, dict)]
+        if not all(isinstance(kind, str) for kind in kinds) or len({*kinds}) < len(held):
+            return {}, {}  # events, or parts of columns
+        held = dict(zip(kinds, held, strict=True))
     if not isinstance(held, dict) or not all(isinstance(one, dict) for one in held.values()):
-        return {}
+        return {}, {}
     out: dict[str, list[Any]] = {}
+    units: dict[str, str] = {}
     for name, one in held.items():
         values = one.get("data")
         if not _begins_plain(values):
-            return {}
+            return {}, {}
         if name.lower() in _PAIRS and all(isinstance(v, list) and len(v) == 2 for v in values):
             out |= {n: [v[k] for v in values] for k, n in enumerate(("lat", "lon"))}
         else:
             out[name] = values
-    return out
+            if unit := one.get("unit", one.get("units")):
+                units[name] = str(unit)
+    return out, units
 
 
 def _is_part(value: Any) -> bool:
@@ -292,7 +299,7 @@ def read_json_table(path: Path) -> RawLog:
     if form in ("columns", "rows"):
         return _by_columns(path)
     if form == "streams":
-        return _of_columns(path, _data_of(from_json(path)))
+        return _of_columns(path, *_data_of(from_json(path)))
     if form in ("member", "nested"):
         whole = from_json(path)
         content = _unwrapped(whole)
@@ -359,10 +366,10 @@ def _by_columns(path: Path) -> RawLog:
     return _of_columns(path, content)
 
 
-def _of_columns(path: Path, content: Any) -> RawLog:
+def _of_columns(path: Path, content: Any, stated: Mapping[str, str] | None = None) -> RawLog:
     held = content if isinstance(content, dict) else {"rows": content}
     # Columns of a sensor are members of it: {"time": […], "gyro": {"x": […], …}}.
-    units: dict[str, str] = {}
+    units = dict(stated or {})
     for name, inner in list(held.items()):
         lists = inner if isinstance(inner, dict) else {}
         lists = {f"{name}.{n}": v for n, v in lists.items() if isinstance(v, list)}

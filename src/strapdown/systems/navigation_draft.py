@@ -558,8 +558,8 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
     if made.noise is not None:
         gyro, accel = made.noise
         noise = (
-            f"{60.0 * math.degrees(gyro):.2g} deg/√h and "
-            f"{accel / STANDARD_GRAVITY * 1e6:.3g} µg/√Hz"
+            f"{float(f'{60.0 * math.degrees(gyro):.2g}'):g} deg/√h and "
+            f"{float(f'{accel / STANDARD_GRAVITY * 1e6:.3g}'):g} µg/√Hz"
         )
         told = [f"noise while it is quiet: gyros and accelerometers {noise}"]
         page.say(f"Found: noise of {noise} while it is quiet.")
@@ -603,10 +603,9 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         if set(stated) == {BIAS}:
             why = f"Found: {turns}."
         elif name in made.shaken:
-            why = (
-                "Found: it shakes far beyond its noise at rest; over the record, so much may be "
-                "white, x, y, z"
-            )
+            why = "Found: it shakes far beyond its noise at rest"
+            if any(name == triad and key in stated for triad, key, _ in NOISE_KEYS):
+                why += "; over the record, so much may be white, x, y, z"
             why += "; and the gyros drift by it:" if name == "gyro" else ":"
             told.append(f"the {full} shake far beyond their noise while it is quiet")
         elif made.guessed:

@@ -71,8 +71,9 @@ from strapdown.tables.checks import ORIGIN_STATED, index_of, values_of
 WINDOW, QUIET = 2.0, 0.05
 #: Ratio to the data-sheet noise beyond which a triad's measured noise is stated instead.
 LOUD = 3.0
-#: Longest average by which noise is measured, s: over longer ones the body moves.
-SLOWEST = 0.16
+#: Longest average by which noise is measured, s: over longer ones the body moves. And that by which
+#: vibration is: over longer ones a vehicle does, on its springs.
+SLOWEST, FAST = 0.16, 0.02
 #: Shaking that gyros rectify, or that folds down between their samples, drifts: its standard
 #: deviation as a share of that of the samples, and over what time, s. Of 4 deg/s of a car's engine
 #: 0.2 deg/s were seen beside RTK.
@@ -463,18 +464,20 @@ class Scatter(NamedTuple):
 
     Attributes
     ----------
-    quiet, loud : ndarray, per √Hz
-        Densities from sample to sample: while it is quiet, and over the record, with vibration.
+    quiet : ndarray, per √Hz
+        Density while it is quiet.
+    loud : ndarray, per √Hz
+        Largest density over the record of what is faster than `FAST`: with vibration.
     white : ndarray, per √Hz
-        The part of `loud` that may be white: the least density over averages of up to `SLOWEST`.
-    step : float, s
-        Of the samples.
+        The part that may be white: the least density over averages of up to `SLOWEST`.
+    shaking : ndarray
+        Standard deviation of what is faster than `FAST`.
     """
 
     quiet: Array
     loud: Array
     white: Array
-    step: float
+    shaking: Array
 
 
 def _scatter(imu: pd.DataFrame) -> Scatter | None:
@@ -492,7 +495,8 @@ def _scatter(imu: pd.DataFrame) -> Scatter | None:
     count = len(time) // size
     if count < 3:
         return None
-    quiet, loud, white = np.empty((3, 2, 3))
+    quiet, loud, white, shaking = np.zeros((4, 2, 3))
+    white[:] = np.inf
     for k, columns in enumerate((GYRO, ACCEL)):
         means, interval = values_of(imu, columns), step
         for octave in range(1 + max(0, int(math.log2(SLOWEST / step)))):
@@ -504,15 +508,19 @@ def _scatter(imu: pd.DataFrame) -> Scatter | None:
             second = np.diff(means, n=2, axis=0)
             each = max(8, size >> octave)
             second = second[: len(second) // each * each].reshape(-1, each, 3)
-            sd = np.sqrt(np.square(second).mean(axis=1) / 6.0) * math.sqrt(interval)
+            sd = np.sqrt(np.square(second).mean(axis=1) / 6.0)
             # Errors grow by the mean of variances, also of a record that rests most of the time;
             # without the largest: a door that shuts is no noise of the drive.
             few = np.sort(sd, axis=0)[: len(sd) - int(QUIET * len(sd))]
             over = np.sqrt(np.square(few).mean(axis=0))
             if not octave:
-                quiet[k], loud[k], white[k] = np.quantile(sd, QUIET, axis=0), over, over
-            white[k] = np.minimum(white[k], over)
-    return Scatter(quiet, loud, white, step) if quiet.min() > 0.0 else None
+                quiet[k] = math.sqrt(interval) * np.quantile(sd, QUIET, axis=0)
+            if not octave or interval <= FAST:
+                shaking[k] = np.maximum(shaking[k], over)
+                loud[k] = np.maximum(loud[k], math.sqrt(interval) * over)
+            white[k] = np.minimum(white[k], math.sqrt(interval) * over)
+    # The noise of sensors that shake throughout is no more than what may be white.
+    return Scatter(np.minimum(quiet, white), loud, white, shaking) if quiet.min() > 0.0 else None
 
 
 def _sensors(
@@ -559,11 +567,15 @@ def _sensors(
         # Over less than its correlation time the drift of the data sheet is a walk.
         driven = factor * math.sqrt(2.0 / drift.correlation_time) * np.asarray(drift.triad)
         walk = 60.0 * np.hypot(driven, drift.steps)
-        drifts = RECTIFIED * ALLAN_OF_GAUSS_MARKOV / math.sqrt(scatter.step) * scatter.loud[0]
-        out["gyro"] |= {
-            key: tuple(float(f"{x * DEG_PER_HOUR:.2g}") for x in size)
-            for key, size in zip(DRIFT_KEYS, (drifts, walk), strict=True)
-        } | {"correlation_time_s": SHAKEN}
+        drifts = RECTIFIED * ALLAN_OF_GAUSS_MARKOV * scatter.shaking[0]
+        out["gyro"] = (
+            out.get("gyro", {})
+            | {
+                key: tuple(float(f"{x * DEG_PER_HOUR:.2g}") for x in size)
+                for key, size in zip(DRIFT_KEYS, (drifts, walk), strict=True)
+            }
+            | {"correlation_time_s": SHAKEN}
+        )
     return (out if north else out | _warming(out["sensor"])), shaken
 
 

@@ -471,7 +471,7 @@ def _with_settled_offsets(
         other, left = _with_offsets(tried, again.smoothed or again.record, before)
         if not left:
             best = tried, again
-        if not left or any(abs(one.data["offset"]) > LARGEST_OFFSET for one in left):
+        if not left or _far(asked, other):
             break
         tried = other
         try:
@@ -481,6 +481,15 @@ def _with_settled_offsets(
         if _gain(*best, tried, again) > -LEAST_GAIN:
             best = tried, again
     return (*best, _by_offset(asked, *best))
+
+
+def _far(asked: NavigationPipeline, chain: NavigationPipeline) -> bool:
+    """Whether a time offset is farther from the stated one than clocks that agree at all."""
+    return any(
+        isinstance(aid, Gnss) and abs(aid.time_offset - own.time_offset) > LARGEST_OFFSET
+        for aid, own in zip(chain.navigator.aids, asked.navigator.aids, strict=True)
+        if isinstance(own, Gnss)
+    )
 
 
 def _by_offset(
@@ -523,6 +532,8 @@ def _with_likeliest_start(
         for step in STARTS:
             offset = aid.time_offset + step * aid.time_offset_sd
             other = with_aid(about, replace(aid, time_offset=offset))
+            if _far(chain, other):
+                continue
             try:
                 again = drive(other)
             except (DataError, DivergenceError):
@@ -631,7 +642,7 @@ def _with_jumps(
                 tried = with_aid(chain, other), replace(source, tables=tables)
                 try:
                     again = drive(*tried)
-                except DivergenceError:
+                except (DataError, DivergenceError):
                     continue
                 gain, count = likelihood_gain(before.record.innovations, again.record.innovations)
                 if gain > max(least, GAIN_EACH * count):

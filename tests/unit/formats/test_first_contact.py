@@ -1391,3 +1391,45 @@ def test_units_that_columns_in_json_state(tmp_path):
     imu = sd.read_imu(path)
     np.testing.assert_allclose(imu[GYRO], 1e-3 * RATE, atol=1e-12)
     assert "io.unit-inferred" not in {f.code for f in imu.findings}
+
+
+@pytest.mark.parametrize("names", [("wx", "wy", "wz"), ("p", "q", "r"), ("gx", "gy", "gz")])
+def test_rates_of_angles_beside_rates_are_not_the_gyro(tmp_path, names):
+    """Those of a reference, in deg/s, took the place of a gyro that is named by letters."""
+    others = ("Roll (deg/s)", "Pitch (deg/s)", "Yaw (deg/s)")
+    force = [f"a{a} [m/s2]" for a in "xyz"]
+    rows = [line("time [s]", *(f"{n} [rad/s]" for n in names), *force, *others)]
+    rows += [line(T[k], *many(RATE[k]), *many(FORCE[k]), 7.0, 8.0, 9.0) for k in range(N)]
+    check(sd.read_imu(written(tmp_path, "reference.csv", rows)))
+
+
+def test_columns_that_are_written_in_parts_are_not_one_part(tmp_path):
+    """Of objects of one type the last took the place of all before it."""
+    held = {"time": T, "gyro_x": RATE[:, 0], "accel_x": FORCE[:, 0]}
+    parts = [
+        {"type": name, "data": values[k : k + 500].tolist()}
+        for k in range(0, N, 500)
+        for name, values in held.items()
+    ]
+    path = tmp_path / "parts.json"
+    path.write_text(json.dumps(parts), encoding="utf-8")
+    with pytest.raises(DataError):
+        sd.read_imu(path)
+
+
+def test_streams_state_their_units(tmp_path):
+    held = {"time": {"data": T.tolist(), "unit": "s"}}
+    for name, unit, values in (("gyro", "deg/s", 1e-3 * RATE * DEG), ("accel", "m/s2", FORCE)):
+        for k, a in enumerate("xyz"):
+            held[f"{name}_{a}"] = {"data": values[:, k].tolist(), "unit": unit}
+    path = tmp_path / "streams.json"
+    path.write_text(json.dumps(held), encoding="utf-8")
+    np.testing.assert_allclose(sd.read_imu(path)[GYRO], 1e-3 * RATE, atol=1e-12)
+
+
+def test_the_number_of_a_sample_in_its_packet_is_no_kind_of_sensor(tmp_path):
+    rows = [line("t_s", "i", *(f"{n}{a}" for n in "uv" for a in "xyz"))]
+    rows += [line(T[k], k % 10, *many(RATE[k]), *many(FORCE[k])) for k in range(N)]
+    path = written(tmp_path, "packets.csv", rows)
+    columns = {f"{t}_{a}": f"{n}{a}" for t, n in (("gyro", "u"), ("accel", "v")) for a in "xyz"}
+    check(sd.read_imu(path, columns=columns, units={"gyro": "rad/s", "accel": "m/s2"}))
