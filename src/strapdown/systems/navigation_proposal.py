@@ -72,8 +72,9 @@ WINDOW, QUIET = 2.0, 0.05
 #: Ratio to the data-sheet noise beyond which a triad's measured noise is stated instead.
 LOUD = 3.0
 #: Longest average by which noise is measured, s: over longer ones the body moves. And that by which
-#: vibration is: over longer ones a vehicle does, on its springs.
-SLOWEST, FAST = 0.16, 0.02
+#: vibration is: over longer ones a vehicle does, on its springs. And the shortest that has all of
+#: the noise: the filter of a sensor leaves less of it in the samples of a faster log.
+SLOWEST, FAST, FILTERED = 0.16, 0.02, 0.01
 #: Shaking that gyros rectify, or that folds down between their samples, drifts: its standard
 #: deviation as a share of that of the samples, and over what time, s. Of 4 deg/s of a car's engine
 #: 0.2 deg/s were seen beside RTK.
@@ -469,7 +470,7 @@ class Scatter(NamedTuple):
     loud : ndarray, per √Hz
         Largest density over the record of what is faster than `FAST`: with vibration.
     white : ndarray, per √Hz
-        The part that may be white: the least density over averages of up to `SLOWEST`.
+        The part that may be white: the least density over averages of `FILTERED` to `SLOWEST`.
     shaking : ndarray
         Standard deviation of what is faster than `FAST`.
     """
@@ -499,7 +500,8 @@ def _scatter(imu: pd.DataFrame) -> Scatter | None:
     white[:] = np.inf
     for k, columns in enumerate((GYRO, ACCEL)):
         means, interval = values_of(imu, columns), step
-        for octave in range(1 + max(0, int(math.log2(SLOWEST / step)))):
+        octaves = 1 + max(0, int(math.log2(SLOWEST / step)))
+        for octave in range(octaves):
             if octave:
                 means = means[: len(means) // 2 * 2].reshape(-1, 2, 3).mean(axis=1)
                 interval *= 2.0
@@ -518,7 +520,8 @@ def _scatter(imu: pd.DataFrame) -> Scatter | None:
             if not octave or interval <= FAST:
                 shaking[k] = np.maximum(shaking[k], over)
                 loud[k] = np.maximum(loud[k], math.sqrt(interval) * over)
-            white[k] = np.minimum(white[k], math.sqrt(interval) * over)
+            if interval > 0.99 * FILTERED or octave + 1 == octaves:
+                white[k] = np.minimum(white[k], math.sqrt(interval) * over)
     # The noise of sensors that shake throughout is no more than what may be white.
     return Scatter(np.minimum(quiet, white), loud, white, shaking) if quiet.min() > 0.0 else None
 
