@@ -198,7 +198,8 @@ def _running() -> subprocess.Popen[bytes]:
             [sys.executable, "-P", "-c", command],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
+            # Never read: its end tells the process that this one is gone.
+            stderr=subprocess.PIPE if os.name == "posix" else subprocess.DEVNULL,
             cwd=Path(sys.executable).anchor,  # the caller may want to remove its own
             bufsize=0,
             env=os.environ | _ENVIRONMENT,
@@ -340,7 +341,7 @@ def _forget() -> None:
     if process is None:
         return
     process.kill()
-    for stream in (process.stdin, process.stdout):
+    for stream in (process.stdin, process.stdout, process.stderr):
         if stream is not None:
             with contextlib.suppress(OSError):
                 stream.close()
@@ -352,7 +353,7 @@ def _after_fork() -> None:
     global _ahead, _lock, _process
     process, _process, _ahead, _lock = _process, None, b"", threading.RLock()
     if process is not None:
-        for stream in (process.stdin, process.stdout):
+        for stream in (process.stdin, process.stdout, process.stderr):
             if stream is not None:
                 stream.close()
         process.returncode = 0  # nobody here waits for it

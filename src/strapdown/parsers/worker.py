@@ -2,7 +2,7 @@
 
 Its limits hold from before the first file: nothing can be written, no core is left, and memory
 and time are set for each file anew. It ends when its input does, and while it parses, too, if the
-caller is gone.
+caller is gone: that closes the pipe that is this process's standard error.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -44,11 +43,13 @@ def _names(function: str) -> tuple[str, str]:
 
 def main() -> None:
     """Answer requests until the input ends."""
-    source, sink = os.dup(0), os.dup(1)
+    source, sink, caller = os.dup(0), os.dup(1), os.dup(2)
     nothing = os.open(os.devnull, os.O_RDWR)
     # What libraries print must not be an answer.
     os.dup2(nothing, 0)
     os.dup2(nothing, 1)
+    os.dup2(nothing, 2)
+    _end_with_caller(caller)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # Arrow would import it to convert columns: 0.3 s for no function that is used here.
     sys.modules["pandas"] = None  # type: ignore[assignment]
@@ -64,9 +65,7 @@ def main() -> None:
             locked = True
             _lock()
         _limit(asked["memory"], asked["seconds"], asked["patience"])
-        ends = _ends_with_caller(source)
         buffers = _encoded(_answer(asked))
-        ends(False)
         _limit(None, None, 0)
         for buffer in buffers:
             view = memoryview(buffer)
@@ -160,22 +159,22 @@ def _in_use() -> int:
     return int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
 
 
-def _ends_with_caller(source: int) -> Callable[[bool], None]:
-    """Let the end of the input end this process while it parses, where the system can."""
+def _end_with_caller(pipe: int) -> None:
+    """Let the end of the caller end this process, whatever it does, where the system can.
 
-    def turn(on: bool) -> None:
-        flags = fcntl.fcntl(source, fcntl.F_GETFL)
-        asynchronous = os.O_ASYNC  # type: ignore[attr-defined, unused-ignore]
-        fcntl.fcntl(source, fcntl.F_SETFL, flags | asynchronous if on else flags & ~asynchronous)
-
+    `pipe`: the end for writing of a pipe of which the caller holds the other and never reads. The
+    input would not do: a signal of its last request may come late, and would end the process, too.
+    """
     try:
         import fcntl
         import select
 
-        fcntl.fcntl(source, fcntl.F_SETOWN, os.getpid())
-        turn(True)
-        if select.select([source], [], [], 0)[0]:  # gone before
+        fcntl.fcntl(pipe, fcntl.F_SETOWN, os.getpid())
+        asynchronous = os.O_ASYNC  # type: ignore[attr-defined, unused-ignore]
+        fcntl.fcntl(pipe, fcntl.F_SETFL, fcntl.fcntl(pipe, fcntl.F_GETFL) | asynchronous)
+        gone = select.poll()
+        gone.register(pipe, select.POLLERR)
+        if gone.poll(0):
             os._exit(0)
-        return turn
     except (ImportError, AttributeError, OSError):
-        return lambda on: None
+        pass

@@ -146,6 +146,26 @@ def read_gpx(path):
 
 
 @posix
+def test_what_comes_on_its_input_while_it_parses_does_not_end_it(log, fifo):
+    """A signal that tells of it, or of the request itself when that comes late."""
+    pid = running().pid
+
+    def more():
+        process._process.stdin.write(b" ")  # of the next request
+        with open(fifo, "w", encoding="utf-8") as file:
+            file.write('<gpx version="1.1"></gpx>')
+
+    soon = threading.Timer(0.3, more)
+    soon.start()
+    with contextlib.suppress(DataError):  # no point is in it
+        read_gpx(fifo)
+    soon.join()
+    assert process._process.pid == pid
+    assert read_raw(log).columns["time_s"].size == 60
+    assert process._process.pid == pid
+
+
+@posix
 def test_one_that_was_ended_while_it_was_idle_is_replaced_in_silence(log):
     running().kill()
     time.sleep(0.1)
