@@ -26,7 +26,7 @@ from strapdown.navigation.record import NavigationRecord, innovation_labels, sta
 from strapdown.navigation.recorder import IntervalRecorder
 from strapdown.navigation.replay import run_batch
 from strapdown.progress import Progress
-from strapdown.tables import ACCEL, GYRO, POSITION_SD, TRAJECTORY, VELOCITY_SD
+from strapdown.tables import ACCEL, GNSS, GYRO, POSITION_SD, TRAJECTORY, VELOCITY_SD, usable
 from strapdown.tables.checks import Array, index_of, source_of, values_of, view_of
 
 #: Standard deviations of a lever arm, m, and of a clock, s, that nobody knows.
@@ -40,6 +40,8 @@ NOISIER = (1.5, 10.0)
 CONTINUED, STEPPED = 0.05, 5.0
 #: A longer record is tested by its part around the worst stretch, s; of which so much is before it.
 LONGEST, PART, BEFORE = 360.0, 300.0, 0.6
+#: Of many more fixes than these, hypotheses are tested with some, evenly: that takes less time.
+FIXES = 360
 #: Standard deviations at the begin of that part: position, m, velocity, m/s, tilt and heading, deg.
 BEGIN_SD = 10.0, 1.0, 5.0, 20.0
 #: Part of the misfit of the run that an explanation leaves at most, and part of the components that
@@ -147,7 +149,7 @@ def blame(
     The run is repeated with one statement changed at a time: lever arm, clock, axes, grade of the
     sensors, noise of the receiver, a stretch at fault. Each is compared with the run by the
     likelihood of the innovations of the same fixes, rejected ones included. A long record is
-    tested by a part.
+    tested by a part, and fast fixes by some of them.
 
     Parameters
     ----------
@@ -175,15 +177,22 @@ def blame(
     if not contradicted(record):
         return ()
     stretch = _worst(record, chain)
-    bench = _Bench(asked, chain, imu, tables, record, progress)
+    bench = whole = _Bench(asked, chain, imu, tables, record, progress)
     if float(imu.index[-1] - imu.index[0]) > LONGEST:
+        bench = bench.part(stretch)
+    begin, end = float(bench.imu.index[0]), float(bench.imu.index[-1])
+    thinned = {name: _thinned(table, begin, end) for name, table in tables.items()}
+    if any(len(table) < len(tables[name]) for name, table in thinned.items()):
+        bench = replace(bench, tables=thinned)
+    if bench is not whole:
         try:
-            bench = bench.part(stretch)
+            record = bench.run(bench.chain, bench.tables, None, "as it is", 0.0)
+            bench = replace(bench, record=record)
         except StrapdownError:
             return ()
     tested: list[Tested] = []
     aid = _receiver(chain, tables)
-    hypotheses = [] if aid is None else _of_receiver(bench, aid, stretch)
+    hypotheses = [] if aid is None else _of_receiver(bench, aid, stretch, tables[aid.name])
     for k, one in enumerate(hypotheses):
         tested += bench.test(one, k / (len(hypotheses) + 1))
     for grade, other in coarser:
@@ -252,9 +261,7 @@ class _Bench:
         def begun(chain: NavigationPipeline) -> NavigationPipeline:
             return replace(chain, modes=(Navigation(),), start=start, commands=())
 
-        bench = replace(self, asked=begun(self.asked), chain=begun(self.chain), imu=imu)
-        record = bench.run(bench.chain, self.tables, None, "as it is", 0.0)
-        return replace(bench, record=record)
+        return replace(self, asked=begun(self.asked), chain=begun(self.chain), imu=imu)
 
     def run(
         self,
@@ -314,8 +321,10 @@ class _Bench:
         return one, self.run(one.chain, one.tables, None, one.name, share)
 
 
-def _of_receiver(bench: _Bench, aid: Gnss, stretch: tuple[float, float] | None) -> list[Hypothesis]:
-    """Hypotheses about a receiver: what it states, its fixes, and axes beside its motion."""
+def _of_receiver(
+    bench: _Bench, aid: Gnss, stretch: tuple[float, float] | None, fixes: pd.DataFrame
+) -> list[Hypothesis]:
+    """Hypotheses about a receiver: what it states, its `fixes`, and axes beside its motion."""
     tables, table = bench.tables, bench.tables[aid.name]
     named = {"name": aid.name}
     clock = replace(aid, time_offset_sd=max(CLOCK, aid.time_offset_sd))
@@ -361,12 +370,14 @@ def _of_receiver(bench: _Bench, aid: Gnss, stretch: tuple[float, float] | None) 
     ]
     if stretch is None:
         return out
-    stamps = index_of(table) - aid.time_offset
-    within = (stamps >= stretch[0] - 1e-3) & (stamps <= stretch[1] + 1e-3)
+    rows, within = (
+        (stamps >= stretch[0] - 1e-3) & (stamps <= stretch[1] + 1e-3)
+        for stamps in (index_of(of) - aid.time_offset for of in (fixes, table))
+    )
     doubted = table.copy()
     doubted.attrs = dict(table.attrs)
     doubted.loc[within, [*POSITION_SD, *VELOCITY_SD]] *= FAULT
-    data = {**named, "since": stretch[0], "until": stretch[1], "rows": int(within.sum())}
+    data = {**named, "since": stretch[0], "until": stretch[1], "rows": int(rows.sum())}
     told = {**tables, aid.name: doubted}
     name = "a stretch of fixes"
     return [*out, Hypothesis(name, "navigation.blame-stretch", bench.chain, 3, told, data=data)]
@@ -466,6 +477,20 @@ def _named(ranked: list[Tested], bench: _Bench, aid: Gnss | None) -> Finding:
     of_fixes = aid is not None and quantity in ("lever_arm", "time", "lat, lon, alt")
     source = source_of(bench.tables[aid.name] if aid is not None and of_fixes else bench.imu)
     return Finding(code, file=source, quantity=quantity, data=data)
+
+
+def _thinned(table: pd.DataFrame, begin: float, end: float) -> pd.DataFrame:
+    """Return a table of fixes with about `FIXES` positions and velocities of a time at most."""
+    if not set(GNSS) <= set(table.columns):
+        return table
+    time, kept = index_of(table), np.zeros(len(table), dtype=bool)
+    for columns in (POSITION_SD[:2], VELOCITY_SD[:2]):
+        rows = np.flatnonzero(usable(table, columns))
+        count = int(np.sum((time[rows] >= begin) & (time[rows] <= end)))
+        kept[rows[:: max(1, count // FIXES)]] = True
+    thinned = table[kept]
+    thinned.attrs = dict(table.attrs)
+    return thinned
 
 
 def _receiver(chain: NavigationPipeline, tables: Mapping[str, pd.DataFrame]) -> Gnss | None:

@@ -152,7 +152,7 @@ def test_what_comes_on_its_input_while_it_parses_does_not_end_it(log, fifo):
 
     def more():
         process._process.stdin.write(b" ")  # of the next request
-        with open(fifo, "w", encoding="utf-8") as file:
+        with Path(fifo).open("w", encoding="utf-8") as file:
             file.write('<gpx version="1.1"></gpx>')
 
     soon = threading.Timer(0.3, more)

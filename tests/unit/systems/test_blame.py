@@ -26,7 +26,7 @@ from strapdown.systems.navigation_run import (
     run_navigation,
 )
 from strapdown.systems.navigation_source import read_navigation_source
-from strapdown.tables import ACCEL, GEODETIC, GYRO
+from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 
 
 @dataclass(frozen=True)
@@ -212,6 +212,28 @@ def test_a_long_record_is_tested_by_a_part(monkeypatch):
     whole = sum(len(table) * 3 for table in record.innovations.values())
     assert found[0].data["count"] < 0.6 * whole
     assert (beyond("arm", found) < 4.0).all()
+
+
+def test_of_fast_fixes_some_are_enough(monkeypatch):
+    """Positions and velocities that come in rows of their own are both kept, of a part only its."""
+    _, _, tables = given("arm", 1)
+    table = tables["gps"]
+    monkeypatch.setattr(blaming, "FIXES", len(table) // 3)
+    found, _, _ = answered("arm", 1)
+    assert short(found) == "lever-arm"
+    assert 1.8 * len(table) < found[0].data["count"] < 2.2 * len(table)  # of six of each
+    assert (beyond("arm", found) < 4.0).all()
+    apart = table.copy()
+    apart.attrs = dict(table.attrs)
+    apart.loc[apart.index[::2], POSITION_SD] = np.inf
+    apart.loc[apart.index[1::2], VELOCITY_SD] = np.inf
+    begin, end = table.index[0], table.index[-1]
+    monkeypatch.setattr(blaming, "FIXES", len(table) // 6)
+    kept = blaming._thinned(apart, begin, end)
+    assert len(kept) == pytest.approx(len(table) / 3, abs=2.0)
+    for names in (POSITION_SD, VELOCITY_SD):
+        assert np.isfinite(kept[names[0]]).mean() == pytest.approx(0.5, abs=0.02)
+    assert blaming._thinned(apart, begin, begin + (end - begin) / 3.0).equals(apart)
 
 
 def test_a_sound_run_is_not_repeated(monkeypatch):
