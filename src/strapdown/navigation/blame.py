@@ -259,7 +259,7 @@ class _Bench:
         )
 
         def begun(chain: NavigationPipeline) -> NavigationPipeline:
-            return replace(chain, modes=(Navigation(),), start=start, commands=())
+            return replace(chain, modes=(Navigation(),), start=start, commands=(), drift=None)
 
         return replace(self, asked=begun(self.asked), chain=begun(self.chain), imu=imu)
 
@@ -420,7 +420,7 @@ def _of_grade(
         for aid in bench.chain.navigator.aids
     )
     navigator = replace(with_aids(other.navigator, aids), wrong=bench.chain.navigator.wrong)
-    chain = replace(other, navigator=navigator)
+    chain = replace(other, navigator=navigator, drift=bench.chain.drift)
     return Hypothesis(
         f"sensors of {grade}",
         "navigation.sensor-contradicted",

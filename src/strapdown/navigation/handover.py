@@ -23,6 +23,7 @@ from strapdown.dsp.samples import running_integral
 from strapdown.earth import gravity
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import DataError
+from strapdown.estimation.covariance import Observation
 from strapdown.estimation.error_filter import ErrorFilter, FilterState, symmetric
 from strapdown.estimation.error_model import PHYSICAL
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
@@ -595,6 +596,17 @@ def _with_biases(
     P[:PHYSICAL, PHYSICAL:] = P[PHYSICAL:, :PHYSICAL].T
     state = filter_.begin(start, _added(symmetric(P), by_others))
     return replace(state, sensors=K @ told[at - PHYSICAL])
+
+
+def with_drift(filter_: ErrorFilter, state: FilterState, drift: float, sd: float) -> FilterState:
+    """Return a state with a hypothesis of the error of the gyros about down, rad/s."""
+    used = filter_.mechanization.nav_state(state.mechanization, state.time)
+    down = rotation.dcm_from_quaternion(used.q_nb)[2]
+    H = np.zeros((1, PHYSICAL + len(state.sensors)))
+    H[0, PHYSICAL:] = down @ _read_at_rest(filter_, np.zeros(6))[:3]
+    z = np.array([drift]) - H[:, PHYSICAL:] @ state.sensors
+    one = Observation("drift", z, H, np.array([sd**2]), ("down, rad/s",))
+    return filter_.observe(state, [one], [None])[0]
 
 
 def _read_at_rest(filter_: ErrorFilter, rest: Array) -> Array:

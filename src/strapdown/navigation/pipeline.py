@@ -14,7 +14,7 @@ import pandas as pd
 from strapdown.alignment.alignment import Site
 from strapdown.errors import ConfigError, DataError, DivergenceError, check_choice
 from strapdown.estimation.error_filter import FilterState
-from strapdown.navigation.handover import align, from_state, handed_over, unused_fixes
+from strapdown.navigation.handover import align, from_state, handed_over, unused_fixes, with_drift
 from strapdown.navigation.measurements.measurement import Measurement
 from strapdown.navigation.modes import (
     Aligned,
@@ -313,6 +313,9 @@ class NavigationPipeline:
         Standard deviation of the site, north, east, down.
     velocity_sd : tuple of float, (3,), m/s
         Standard deviation of the velocity after a coarse alignment at a site, where it is zero.
+    drift : tuple of float, (2,), rad/s, optional
+        Error of the gyros about down with which navigation begins, and its standard deviation: a
+        hypothesis, beside what is stated of the sensors.
     fixes : str, optional
         Name of the measurement whose table holds the fixes of an alignment; the first GNSS
         receiver, if not given.
@@ -333,6 +336,7 @@ class NavigationPipeline:
     site: Site | None = None
     site_sd: Three = (1.0, 1.0, 1.0)
     velocity_sd: Three = (0.1, 0.1, 0.1)
+    drift: tuple[float, float] | None = None
     fixes: str | None = None
     commands: tuple[Command, ...] = ()
     deliveries: MeasurementMonitor = field(default_factory=MeasurementMonitor)
@@ -777,6 +781,8 @@ class ModeSequencer:
     ) -> None:
         chain, state = self._chain, self._state
         anew = chain.intake.gaps.beyond == "align"
+        if chain.drift is not None:
+            begun = with_drift(chain.navigator.filter, begun, *chain.drift)
         navigator = chain.navigator.begin_from(begun)
         for name, tables in {**state.told, **(without or {})}.items():
             for table in tables:

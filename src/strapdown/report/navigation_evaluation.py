@@ -415,7 +415,8 @@ def trust(evaluation: NavigationEvaluation) -> Trust:
         reasons.append(reason(False, "navigation.nothing-observed"))
     wrong = any(one.severity == "warning" for one in known)
     wrong |= any(one.refutes for one in evaluation.agreements)
-    wrong |= any(one.code in REFUTING for one in evaluation.run.findings)
+    refuting = (*REFUTING, "navigation.heading-ambiguous")
+    wrong |= any(one.code in refuting for one in evaluation.run.findings)
     against = any(one.severity == "warning" for one in reasons)
     verdict = "trusted" if not against else "distrusted" if wrong else "reserve"
     return Trust(verdict, tuple(reasons), _short(evaluation))

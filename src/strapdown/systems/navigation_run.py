@@ -79,6 +79,7 @@ from strapdown.navigation.replay import PipelineRun, relinearized, run_batch, st
 from strapdown.navigation.smoother import RauchTungStriebel
 from strapdown.navigation.truth_comparison import SmootherConsistency, smoother_consistency
 from strapdown.progress import Progress, silent
+from strapdown.rotation import dcm_from_euler
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.inputs import Memory, SavedRun, configuration_file
@@ -123,6 +124,12 @@ SETTLED = 0.01
 STEPS_OF_OFFSET, LEAST_PART = 10, 0.25
 #: Other offsets that a run is begun with, in standard deviations of what is assumed.
 STARTS = (-2.0, -1.0, 1.0, 2.0)
+#: A heading that was known worse than this, deg, may be another than a linear filter has found. Of
+#: the errors of the gyros about the vertical that are tried: the step and the standard deviation
+#: about each, rad/s; how many of the deviations of the unit to both sides.
+OPEN, DRIFT, ABOUT_DRIFT, DRIFTS = 20.0, math.radians(1.0), math.radians(0.7), 2.5
+#: The begin of a record over which they are tried, s.
+EARLY = 360.0
 #: A run is repeated with the offset that it found, known to so many of its standard deviations,
 #: where that is at most this part of what was assumed, and where the assumed one moves the vehicle,
 #: at the speed that is exceeded for a tenth of the time, by so many standard deviations of fixes.
@@ -205,9 +212,10 @@ def run_navigation(
         return drive(other, used.imu, used.tables, recorder, show_mode)
 
     progress("aligning" if spec.start is None else "navigating", BEGUN)
-    asked = chain
     with said_of_file(*tables):
         run = again(chain)
+        chain, run, by_drift = _with_likeliest_drift(chain, run, source, again)
+        asked = chain
         chain, run, source, by_offset, by_jumps = _explained(chain, run, source, again)
         if by_jumps:
             asked = _with_jumps_of(chain, asked)
@@ -320,7 +328,7 @@ def run_navigation(
         *(() if fine is None or fine.fine is None else fine.fine.findings),
         *_lost_start(chain, source.imu, best.trajectory),
         *_unsettled(run),
-        *in_file((*by_offset, *by_jumps, *by_recovery), *tables),
+        *in_file((*by_drift, *by_offset, *by_jumps, *by_recovery), *tables),
     ]
     return NavigationRun(
         spec=spec,
@@ -414,6 +422,65 @@ def _turns(euler: NDArray[np.float64]) -> NDArray[np.float64]:
             heading - roll * np.sin(at_pitch),
         ]
     )
+
+
+def _with_likeliest_drift(
+    chain: NavigationPipeline,
+    run: PipelineRun,
+    source: NavigationSource,
+    drive: Callable[[NavigationPipeline, NavigationSource], PipelineRun],
+) -> tuple[NavigationPipeline, PipelineRun, tuple[Finding, ...]]:
+    """Repeat a run that lost its heading with the likeliest error of the gyros about the vertical.
+
+    Where the heading drifts away before the motion shows it, several are solutions of a linear
+    filter, each with an error of the gyros that belongs to it.
+    """
+    record, bias = run.record, [f"gyro_bias_{axis}" for axis in "xyz"]
+    lost = bool((record.sd["heading"] > OPEN).any())
+    known = any(one.alignment.gyro_bias is not None for one in run.aligned)
+    if not lost or known or not set(bias) <= set(record.sensors):
+        return chain, run, ()
+    down = dcm_from_euler(np.radians(values_of(record.trajectory, EULER)[0]))[2]
+    found, sd = (values_of(of, bias)[0] for of in (record.sensors, record.sensors_sd))
+    count = int(DRIFTS * float(np.linalg.norm(down * sd)) / DRIFT)
+    early = source.imu[source.imu.index <= float(source.imu.index[0]) + EARLY]
+    early.attrs = dict(source.imu.attrs)
+    begin = replace(source, imu=early)
+    bare = replace(chain, navigator=replace(chain.navigator, smoother=None))
+    tried = [bare]
+    for step in range(-count, count + 1) if count else ():
+        drift = float(down @ found) + step * DRIFT
+        tried.append(replace(bare, drift=(drift, ABOUT_DRIFT)))
+    runs: list[tuple[float, NavigationPipeline, NavigationRecord]] = []
+    for other in tried:
+        try:
+            its = drive(other, begin).record
+        except (DataError, DivergenceError):
+            continue
+        gain = likelihood_gain(runs[0][2].innovations, its.innovations)[0] if runs else 0.0
+        runs.append((gain, other, its))
+    if len(runs) < 2:
+        return chain, run, ()
+    gain, best, its = max(runs, key=lambda one: one[0])
+    if gain < LEAST_GAIN:
+        gain, best, its = runs[0]
+    at, heading, findings = its.trajectory.index[-1], its.trajectory["heading"].iloc[-1], []
+    others = [
+        abs((other.trajectory["heading"].iloc[-1] - heading + 180.0) % 360.0 - 180.0)
+        for its_gain, _, other in runs
+        if its_gain > gain - LEAST_GAIN
+    ]
+    if max(others) > OPEN:
+        findings.append(
+            Finding("navigation.heading-ambiguous", quantity="heading", at=at, apart=max(others))
+        )
+    if best.drift is None:
+        return chain, run, tuple(findings)
+    code = "navigation.run-again-with-drift"
+    data = {"drift": math.degrees(best.drift[0]), "gain": gain, "count": len(tried) - 1}
+    chain = replace(chain, drift=best.drift)
+    findings.insert(0, Finding(code, severity="note", quantity="gyro", data=data))
+    return chain, drive(chain, source), tuple(findings)
 
 
 def _explained(
