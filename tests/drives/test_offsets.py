@@ -1,7 +1,8 @@
-"""Time offsets of made-up drives are found wherever the search begins."""
+"""Time offsets and lost headings of made-up drives are found wherever the search begins."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from tests.drives.generator import draw, make
 from tests.drives.judge import propose
@@ -10,6 +11,8 @@ import strapdown as sd
 
 #: A walk with positions of centimeters once a second, whose steps are alike every half second.
 WALK = 31026
+#: A boat with a phone whose gyros are off by 1 deg/s and more, and which shows its heading late.
+BOAT = 31088
 #: Of its log, and how well its offset is known at the end, s.
 STEP, KNOWN = 0.01, 0.03
 
@@ -28,3 +31,23 @@ def test_an_offset_is_found_from_wherever_the_search_begins(late, tmp_path):
         assumed = offsets[-1].data["offset"] if offsets else start
         found.append(assumed - run.filtered.sensors["gnss.time_offset_t"].iloc[-1])
     assert found == pytest.approx([late] * 3, abs=KNOWN + STEP)
+
+
+@pytest.mark.slow
+def test_a_heading_that_was_lost_is_found_or_called_ambiguous(tmp_path):
+    """To a single run it is off by up to half a circle, with a bound of 20 degrees."""
+    for duration, told in ((60.0, None), (90.0, "ambiguous"), (266.4, "found")):
+        made = make(draw(BOAT) | {"duration_s": duration}, tmp_path)
+        config, _, _ = propose(made)
+        config.write_text(config.read_text() + "\n[trust]\nrepeat = false\n")
+        run = sd.navigate(config)
+        codes = {f.code for f in run.findings}
+        assert ("navigation.run-again-with-drift" in codes) == (told == "found")
+        assert ("navigation.heading-ambiguous" in codes) == (told == "ambiguous")
+        time = run.sd.index.to_numpy()
+        heading = np.interp(
+            time, run.trajectory.index, np.unwrap(run.trajectory["heading"], period=360.0)
+        )
+        truth = made.motion.state(made.time(time + made.stamps[0]))["heading"]
+        off = np.abs((heading - truth + 180.0) % 360.0 - 180.0)
+        assert (off < 3.0 * run.sd["heading"]).all()

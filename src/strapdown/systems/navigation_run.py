@@ -441,46 +441,52 @@ def _with_likeliest_drift(
     if not lost or known or not set(bias) <= set(record.sensors):
         return chain, run, ()
     down = dcm_from_euler(np.radians(values_of(record.trajectory, EULER)[0]))[2]
-    found, sd = (values_of(of, bias)[0] for of in (record.sensors, record.sensors_sd))
-    count = int(DRIFTS * float(np.linalg.norm(down * sd)) / DRIFT)
-    early = source.imu[source.imu.index <= float(source.imu.index[0]) + EARLY]
-    early.attrs = dict(source.imu.attrs)
-    begin = replace(source, imu=early)
+    found, unsure = (values_of(of, bias)[0] for of in (record.sensors, record.sensors_sd))
+    count = int(DRIFTS * float(np.linalg.norm(down * unsure)) / DRIFT)
+    if not count:
+        return chain, run, ()
     bare = replace(chain, navigator=replace(chain.navigator, smoother=None))
-    tried = [bare]
-    for step in range(-count, count + 1) if count else ():
-        drift = float(down @ found) + step * DRIFT
-        tried.append(replace(bare, drift=(drift, ABOUT_DRIFT)))
-    runs: list[tuple[float, NavigationPipeline, NavigationRecord]] = []
-    for other in tried:
+    begin = source
+    if float(source.imu.index[-1] - source.imu.index[0]) > EARLY:
+        early = source.imu[source.imu.index <= float(source.imu.index[0]) + EARLY]
+        early.attrs = dict(source.imu.attrs)
+        begin = replace(source, imu=early)
+        record = drive(bare, begin).record
+    runs = [(0.0, bare, record)]
+    for step in range(-count, count + 1):
+        other = replace(bare, drift=(float(down @ found) + step * DRIFT, ABOUT_DRIFT))
         try:
-            its = drive(other, begin).record
+            again = drive(other, begin).record
         except (DataError, DivergenceError):
             continue
-        gain = likelihood_gain(runs[0][2].innovations, its.innovations)[0] if runs else 0.0
-        runs.append((gain, other, its))
-    if len(runs) < 2:
-        return chain, run, ()
-    gain, best, its = max(runs, key=lambda one: one[0])
-    if gain < LEAST_GAIN:
-        gain, best, its = runs[0]
-    at, heading, findings = its.trajectory.index[-1], its.trajectory["heading"].iloc[-1], []
-    others = [
-        abs((other.trajectory["heading"].iloc[-1] - heading + 180.0) % 360.0 - 180.0)
-        for its_gain, _, other in runs
-        if its_gain > gain - LEAST_GAIN
-    ]
-    if max(others) > OPEN:
-        findings.append(
-            Finding("navigation.heading-ambiguous", quantity="heading", at=at, apart=max(others))
-        )
-    if best.drift is None:
-        return chain, run, tuple(findings)
+        runs.append((likelihood_gain(record.innovations, again.innovations)[0], other, again))
+    best = max(runs, key=lambda one: one[0])
+    if best[0] < LEAST_GAIN:
+        best = runs[0]
+    findings: tuple[Finding, ...] = ()
+    heading, sd = _last_heading(best[2])
+    apart = 0.0
+    for gain, _, again in runs:
+        other_heading, other_sd = _last_heading(again)
+        off = abs((other_heading - heading + 180.0) % 360.0 - 180.0)
+        if gain > best[0] - LEAST_GAIN and off > max(OPEN, SURELY * math.hypot(sd, other_sd)):
+            apart = max(apart, off)
+    if apart > 0.0:
+        data: dict[str, float] = {"at": float(best[2].trajectory.index[-1]), "apart": apart}
+        findings = (Finding("navigation.heading-ambiguous", quantity="heading", data=data),)
+    drift = best[1].drift
+    if drift is None:
+        return chain, run, findings
     code = "navigation.run-again-with-drift"
-    data = {"drift": math.degrees(best.drift[0]), "gain": gain, "count": len(tried) - 1}
-    chain = replace(chain, drift=best.drift)
-    findings.insert(0, Finding(code, severity="note", quantity="gyro", data=data))
-    return chain, drive(chain, source), tuple(findings)
+    data = {"drift": math.degrees(drift[0]), "gain": best[0], "count": 2 * count + 1}
+    findings = (Finding(code, severity="note", quantity="gyro", data=data), *findings)
+    chain = replace(chain, drift=drift)
+    return chain, drive(chain, source), findings
+
+
+def _last_heading(record: NavigationRecord) -> tuple[float, float]:
+    """Heading at the end of a record and its standard deviation, deg."""
+    return float(record.trajectory["heading"].iloc[-1]), float(record.sd["heading"].iloc[-1])
 
 
 def _explained(

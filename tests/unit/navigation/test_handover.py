@@ -17,7 +17,7 @@ from strapdown.estimation.sensor_blocks import accel_bias, accel_scale, gyro_bia
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
 from strapdown.navigation.filter_options import OpenLoop
-from strapdown.navigation.handover import _with_biases, from_alignment, from_fine
+from strapdown.navigation.handover import _with_biases, from_alignment, from_fine, with_drift
 from strapdown.navigation.navigator import Navigator
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
@@ -300,3 +300,25 @@ def test_a_place_that_was_carried_goes_with_all_that_goes_with_the_velocity(afte
     told = in_ned(filter_, begun)
     sd = np.sqrt(np.diagonal(carried))
     assert told / sd / sd[:, None] == pytest.approx(carried / sd / sd[:, None], abs=1e-9)
+
+
+def test_a_hypothesis_of_the_drift_is_that_of_the_heading():
+    """It is known as stated, and about level axes nothing else is: the prior is far wider."""
+    filter_ = ErrorFilter(
+        MECHANIZATIONS["ned"](),
+        ERROR_MODELS["rotation_vector"](
+            (1e-6,) * 3, (1e-4,) * 3, (gyro_bias(0.05), gyro_drift(0.05, 100.0))
+        ),
+        COVARIANCES["ud"](),
+    )
+    start = NavState.from_degrees(*HERE, roll_deg=20.0, pitch_deg=-30.0, heading_deg=70.0)
+    begun = filter_.begin(start, np.eye(PHYSICAL + 6) * 0.05**2)
+    after = with_drift(filter_, begun, 0.02, 0.001)
+    level = rotation.dcm_from_quaternion(start.q_nb)
+    drift = level @ (after.sensors[:3] + after.sensors[3:])
+    P = filter_.physical_covariance(after)[PHYSICAL:, PHYSICAL:]
+    both = level @ (P[:3, :3] + P[:3, 3:] + P[3:, :3] + P[3:, 3:]) @ level.T
+    prior = 2.0 * 0.05**2
+    share = prior / (prior + 0.001**2)
+    np.testing.assert_allclose(drift, [0.0, 0.0, 0.02 * share], atol=1e-12)
+    np.testing.assert_allclose(both, np.diag([prior, prior, prior * (1.0 - share)]), atol=1e-12)
