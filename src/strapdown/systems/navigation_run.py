@@ -122,8 +122,12 @@ SETTLED = 0.01
 #: How often at most: by a second, states of sensors take a part of it, and each run finds some of
 #: the rest, of which the part found is taken to be at least the second.
 STEPS_OF_OFFSET, LEAST_PART = 10, 0.25
-#: Other offsets that a run is begun with, in standard deviations of what is assumed.
-STARTS = (-2.0, -1.0, 1.0, 2.0)
+#: Other offsets that a run is begun with, in standard deviations of what is assumed. Of a body that
+#: swings, as by its steps, they are so far apart at most, s: a part of its period.
+STARTS, FINER = (-2.0, -1.0, 1.0, 2.0), 0.1
+#: A body swings where its acceleration about the mean over a second exceeds this, m/s², and that of
+#: the mean. Of fewer rows a second a trajectory does not show it.
+SWINGS, ROWS = 1.0, 5
 #: A heading that was known worse than this, deg, may be another than a linear filter has found. Of
 #: the errors of the gyros about the vertical that are tried: the step and the standard deviation
 #: about each, rad/s; how many of the deviations of the unit to both sides.
@@ -590,21 +594,24 @@ def _by_offset(
 def _with_likeliest_start(
     chain: NavigationPipeline, run: PipelineRun, drive: Callable[[NavigationPipeline], PipelineRun]
 ) -> tuple[NavigationPipeline, PipelineRun]:
-    """Begin a run that its fixes contradict with the likeliest of other time offsets.
+    """Begin a run with the likeliest of other time offsets, if its fixes contradict it.
 
     Steps of a walk, or waves, are alike every half second or few: about a wrong offset the nearest
-    estimate is another wrong one.
+    estimate is another wrong one. And of a body that swings, the mean acceleration over which a fix
+    is compared does not show by how much: tilts and biases explain it, and nothing contradicts.
     """
     best = chain, run
     for aid in chain.navigator.aids:
         if not isinstance(aid, Gnss) or aid.time_offset_sd <= CONTINUED:
             continue
-        if not contradicted(best[1].record):
+        starts = np.array(STARTS) * aid.time_offset_sd
+        if _swings(best[1].record):
+            starts = np.linspace(starts[0], starts[-1], 2 * math.ceil(starts[-1] / FINER) + 1)
+        elif not contradicted(best[1].record):
             break
         about = best[0]
-        for step in STARTS:
-            offset = aid.time_offset + step * aid.time_offset_sd
-            other = with_aid(about, replace(aid, time_offset=offset))
+        for step in starts[starts != 0.0].tolist():
+            other = with_aid(about, replace(aid, time_offset=aid.time_offset + step))
             if _far(chain, other):
                 continue
             try:
@@ -614,6 +621,20 @@ def _with_likeliest_start(
             if _gain(*best, other, again) > LEAST_GAIN:
                 best = other, again
     return best
+
+
+def _swings(record: NavigationRecord) -> bool:
+    """Whether the acceleration changes within a second more than from second to second."""
+    time, velocity = index_of(record.trajectory), values_of(record.trajectory, VELOCITY)
+    rows = round(1.0 / float(np.median(np.diff(time)))) if len(time) > 1 else 0
+    if rows < ROWS or len(time) <= 2 * rows:
+        return False
+    sums = np.cumsum(np.pad(velocity, ((1, 0), (0, 0))), axis=0)
+    slow = (sums[rows:] - sums[:-rows]) / rows
+    fast = velocity[rows // 2 : rows // 2 + len(slow)] - slow
+    changes = (np.diff(of, axis=0) * rows for of in (fast, slow))
+    within, between = (math.sqrt(float(np.square(of).sum(axis=1).mean())) for of in changes)
+    return within > max(SWINGS, between)
 
 
 def _with_offsets(
