@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from strapdown.cli.console import WORDS, console, print_blocks, print_findings
+from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save, source_name
 from strapdown.cli.shared_options import (
     LOG_FLAGS,
     FixFlags,
@@ -113,13 +115,6 @@ def align(
     drifts and biases; the report states the uncertainty of each, its limits, and the alignment
     time.
     """
-    from strapdown.cli.console import WORDS
-    from strapdown.cli.result_folder import (
-        folder_to_write,
-        refuse_result,
-        run_and_save,
-        source_name,
-    )
     from strapdown.config.alignment import AlignmentSpec
     from strapdown.systems.alignment_run import run_alignment
 
@@ -189,7 +184,6 @@ def _flag(place: str) -> str:
 
 def print_alignment(result: AlignmentRun) -> None:
     """Print the result of an alignment, its limits and its findings."""
-    from strapdown.cli.console import console, print_blocks, print_findings
     from strapdown.report import alignment_document as tables
     from strapdown.report.alignment_document import trust
     from strapdown.report.values import spaced

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from strapdown.cli.console import console, print_blocks, print_findings
+from strapdown.cli.result_folder import file_beside, folder_to_write, refuse_result, run_and_save
 from strapdown.cli.shared_options import (
     LogFlags,
     ReportFlags,
@@ -71,13 +73,6 @@ def allan(
     that the record does not show has an upper bound.
     """
     from strapdown.api.allan import allan as analyse
-    from strapdown.cli.console import print_findings
-    from strapdown.cli.result_folder import (
-        file_beside,
-        folder_to_write,
-        refuse_result,
-        run_and_save,
-    )
 
     for log in logs:
         refuse_result(log, "log")
@@ -103,7 +98,6 @@ def allan(
 
 def print_noise(result: AllanRun, sensor_file: Path | None) -> None:
     """Print the terms of each channel, the parameters of another program, and the next command."""
-    from strapdown.cli.console import console, print_blocks
     from strapdown.report.allan import headline, parameter_table, term_tables
     from strapdown.report.values import spaced
 

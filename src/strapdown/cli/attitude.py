@@ -9,6 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from strapdown.cli.console import (
+    Stopwatch,
+    console,
+    print_findings,
+    print_seal,
+    print_table,
+    progress,
+)
+from strapdown.cli.result_folder import claim, folder_to_write, refuse_result
 from strapdown.cli.shared_options import (
     Height,
     LogFlags,
@@ -20,6 +29,7 @@ from strapdown.cli.shared_options import (
     with_what,
     writing,
 )
+from strapdown.errors import ConfigError, printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -204,9 +214,6 @@ def attitude(
     """
     from strapdown.attitude_comparison.comparison import run_comparison
     from strapdown.bundle import to_json, write_timing
-    from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
-    from strapdown.cli.result_folder import claim, folder_to_write, refuse_result
-    from strapdown.errors import ConfigError
     from strapdown.report.attitude import attitude_json
 
     if files.png:
@@ -283,8 +290,6 @@ def _options(compare: ComparisonFlags, log: LogFlags) -> AttitudeOptions:
 
 def _numbers(text: str | None) -> list[float]:
     """Parse numbers separated by blanks or commas."""
-    from strapdown.errors import ConfigError
-
     try:
         return [float(word) for word in (text or "").replace(",", " ").split()]
     except ValueError:
@@ -312,8 +317,6 @@ def print_comparison(bench: AttitudeComparison, *, verbose: bool = False) -> Non
 
     `verbose`: also the tables that the answer does not rest on.
     """
-    from strapdown.cli.console import console, print_table
-    from strapdown.errors import printable
     from strapdown.report import attitude_tables as tables
     from strapdown.report import attitude_words as words
 
@@ -380,8 +383,6 @@ def _sample_times(bench: AttitudeComparison) -> dict[str, tuple[float, float]]:
 
 def _print_speed(taken: Mapping[str, tuple[float, float]]) -> None:
     """Print the time per sample of each algorithm and filter on this machine."""
-    from strapdown.cli.console import console, print_table
-
     console().print("\nTime of a sample on this machine")
     print_table(
         ["algorithm", "float64, ns", "float32, ns"],
@@ -390,8 +391,6 @@ def _print_speed(taken: Mapping[str, tuple[float, float]]) -> None:
 
 
 def _print_table(table: TableBlock, page: Console) -> None:
-    from strapdown.cli.console import print_table
-
     page.print(f"\n{table.title}", style="bold")
     print_table(table.columns, table.rows, text=table.text, strong=table.strong)
     if table.caption:

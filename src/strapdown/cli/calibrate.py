@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from strapdown.cli.console import console, print_blocks, print_findings
+from strapdown.cli.result_folder import file_beside, folder_to_write, refuse_result, run_and_save
 from strapdown.cli.shared_options import (
     Height,
     LogFlags,
@@ -107,13 +109,6 @@ def calibrate(
     pose or turn that would. A magnetometer is calibrated, too.
     """
     from strapdown.api.calibrate import calibrate as find
-    from strapdown.cli.console import print_findings
-    from strapdown.cli.result_folder import (
-        file_beside,
-        folder_to_write,
-        refuse_result,
-        run_and_save,
-    )
 
     for log in logs:
         key, _, value = log.name.partition("=")
@@ -145,7 +140,6 @@ def calibrate(
 
 def print_calibration(result: CalibrateRun) -> None:
     """Print the errors with their bounds, and what the calibration changes."""
-    from strapdown.cli.console import console, print_blocks
     from strapdown.report.calibrate import (
         effect_table,
         field_table,

@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from strapdown.cli.console import console, print_blocks, print_findings, progress
+from strapdown.cli.result_folder import default_folder, run_and_save
 from strapdown.cli.shared_options import ReportFlags, folder_to_make, running, spread, writing
+from strapdown.errors import ConfigError, Finding
 
 if TYPE_CHECKING:
     from strapdown.bundle import Seal
@@ -85,7 +88,6 @@ def run(
     """Run a campaign from its file."""
     from strapdown.campaign.engine import Workers
     from strapdown.campaign.run import WORKING, run_campaign
-    from strapdown.cli.result_folder import default_folder
 
     folder = out or default_folder(file, "campaign")
     share = _part(part)
@@ -118,7 +120,6 @@ def resume(
     from strapdown.campaign.engine import Workers
     from strapdown.campaign.run import WORKING, open_campaign
     from strapdown.campaign.run import resume as go_on
-    from strapdown.errors import ConfigError
 
     name = folder.name.removesuffix(WORKING)
     working, made = folder.with_name(name + WORKING), folder.with_name(name)
@@ -141,8 +142,6 @@ def _run(folder: Path, write: Any, compute: Any, *, complete: bool = True) -> No
     import shutil
 
     from strapdown.campaign.run import WORKING
-    from strapdown.cli.console import console
-    from strapdown.cli.result_folder import run_and_save
 
     working = folder.with_name(folder.name + WORKING)
 
@@ -150,8 +149,6 @@ def _run(folder: Path, write: Any, compute: Any, *, complete: bool = True) -> No
         console(err=True).print(f"Dashboard: {address}", markup=False)
 
     if not complete:
-        from strapdown.cli.console import progress
-
         with progress(write.quiet or write.json) as show:
             made = compute(show, shown)
         if not write.quiet:
@@ -202,7 +199,6 @@ def merge(
 ) -> None:
     """Put the parts of a campaign from several machines together; resume completes it."""
     from strapdown.campaign.run import WORKING, merge_parts
-    from strapdown.cli.console import console
 
     working = out.with_name(out.name + WORKING)
     missing = merge_parts(folders, working)
@@ -217,7 +213,6 @@ def status(
 ) -> None:
     """Show how many cases of a campaign are done, and what became of them."""
     from strapdown.campaign.run import open_campaign
-    from strapdown.cli.console import console
 
     found = open_campaign(folder)
     counts: dict[str, int] = {}
@@ -252,7 +247,6 @@ def report(
 ) -> None:
     """Write the page of a campaign as it is now, complete or not."""
     from strapdown.campaign.run import report_now
-    from strapdown.cli.console import console
 
     path = out or folder.with_name(f"{folder.name}-report.html")
     report_now(folder, path)
@@ -270,8 +264,6 @@ def case(
 ) -> None:
     """Run one case by itself, to the same bits, with its full report."""
     from strapdown.campaign.run import case_of, differing, open_campaign, save_case
-    from strapdown.cli.console import console, print_findings
-    from strapdown.errors import Finding
 
     found = open_campaign(folder)
     result, row, recorded = case_of(folder, number)
@@ -300,7 +292,6 @@ def case(
 def print_campaign(frozen: dict[str, Any], summary: dict[str, Any], name: str) -> None:
     """Print the answers that the first page of the report shows."""
     from strapdown.campaign.page import campaign_document
-    from strapdown.cli.console import console, print_blocks
     from strapdown.report.document import Items, KeyFigures, Paragraph, TableBlock
     from strapdown.report.values import spaced
 

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from strapdown.cli.console import console, print_blocks, print_findings
+from strapdown.cli.console import progress as bar
+from strapdown.cli.result_folder import run_and_save
 from strapdown.cli.shared_options import ReportFlags, spread, writing
 
 if TYPE_CHECKING:
@@ -45,7 +48,6 @@ def compare(
     a temporary folder, and kept only by --out.
     """
     from strapdown.bundle import to_json
-    from strapdown.cli.result_folder import run_and_save
     from strapdown.report.compare import compare_results, comparison_json
 
     def compute(progress: Progress) -> RunComparison:
@@ -55,8 +57,6 @@ def compare(
     if out is not None:
         result = run_and_save(compute, out, write, "compare.json", show)
     else:
-        from strapdown.cli.console import progress as bar
-
         with bar(write.quiet or write.json) as report:
             result = compute(report)
         if write.json:
@@ -68,7 +68,6 @@ def compare(
 
 
 def _print(result: RunComparison, *, verbose: bool) -> None:
-    from strapdown.cli.console import console, print_blocks, print_findings
     from strapdown.report import compare_document as page
     from strapdown.report.values import spaced
 

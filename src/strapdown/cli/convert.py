@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from strapdown.cli.console import console, print_findings, print_table
 from strapdown.cli.shared_options import (
     FixFlags,
     LogFlags,
@@ -85,7 +86,6 @@ def convert(
     from strapdown.api.writing import read_streams, writer_streams
     from strapdown.api.writing import write as write_file
     from strapdown.bundle import to_json
-    from strapdown.cli.console import console, print_findings, print_table
     from strapdown.formats import STREAMS
     from strapdown.formats.clocks import clock_of
 

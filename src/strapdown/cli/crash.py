@@ -8,6 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from strapdown.cli.console import (
+    WORDS,
+    Stopwatch,
+    console,
+    print_blocks,
+    print_findings,
+    print_seal,
+    progress,
+)
+from strapdown.cli.result_folder import claim, folder_to_write, refuse_result
 from strapdown.cli.shared_options import (
     Recover,
     ReportFlags,
@@ -18,6 +28,7 @@ from strapdown.cli.shared_options import (
     spread,
     writing,
 )
+from strapdown.errors import printable
 
 if TYPE_CHECKING:
     from strapdown.crash.case import CaseResult
@@ -103,17 +114,6 @@ def crash(
         return
     from strapdown.api.crash import reconstruct
     from strapdown.bundle import MANIFEST, Seal, sha256, write_timing
-    from strapdown.cli.console import (
-        WORDS,
-        Stopwatch,
-        console,
-        print_blocks,
-        print_findings,
-        print_seal,
-        progress,
-    )
-    from strapdown.cli.result_folder import claim, folder_to_write, refuse_result
-    from strapdown.errors import printable
     from strapdown.report.values import shown_in
 
     for case in cases:
@@ -159,7 +159,6 @@ def crash(
 
 def print_crash(result: CaseResult) -> None:
     """Print the results of a case, and their limits."""
-    from strapdown.cli.console import console, print_blocks
     from strapdown.report.crash_tables import (
         answers_table,
         closure_table,

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from strapdown.cli.console import console, print_blocks, print_findings
+from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
 from strapdown.cli.shared_options import (
     FixFlags,
     LogFlags,
@@ -61,8 +63,6 @@ def doctor(
     something open is examined with the answers as inferred, and the questions are listed.
     """
     from strapdown.api.doctor import doctor as examine
-    from strapdown.cli.console import console, print_findings
-    from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
     from strapdown.systems.clean_log import axes_of_clean_log, write_clean_log
 
     for log in logs:
@@ -101,7 +101,6 @@ def print_log(
     `paths`: of logs by name, for commands. `logs`: paths of all that were examined.
     `tables`: also those of channels and rests.
     """
-    from strapdown.cli.console import console, print_blocks
     from strapdown.report import doctor as report
     from strapdown.report.values import spaced
 

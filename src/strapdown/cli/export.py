@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from strapdown.cli.console import console
 from strapdown.cli.shared_options import OutFlags, spread
 
 EPILOG = (
@@ -39,7 +40,6 @@ def export(
     """
     from strapdown.bundle import to_json
     from strapdown.bundle.atomic_folder import replace_file
-    from strapdown.cli.console import console
     from strapdown.report.attitude_export import WRITERS, check_export, export_module
 
     check_export(file, write.force, quantity="FILE")

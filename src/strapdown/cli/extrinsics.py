@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from strapdown.cli.console import console, print_blocks, print_findings
+from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
 from strapdown.cli.shared_options import (
     FixFlags,
     LogFlags,
@@ -93,7 +95,6 @@ def extrinsics(
     """
     from strapdown.api.extrinsics import extrinsics as find
     from strapdown.api.reading import read_gnss
-    from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
 
     refuse_result(log, "log")
     keys: dict[str, Any] = {k: v for k, v in log_keys(flags.given()).items() if v}
@@ -134,7 +135,6 @@ FLAGS = {
 
 def print_extrinsics(result: ExtrinsicsRun) -> None:
     """Print the parameters, the lines for a navigation configuration, and the findings."""
-    from strapdown.cli.console import console, print_blocks, print_findings
     from strapdown.report.extrinsics import headline, navigation_lines, table
     from strapdown.report.values import spaced
 

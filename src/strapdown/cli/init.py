@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from strapdown.cli.console import console, print_findings, progress
+from strapdown.cli.result_folder import refuse_result
 from strapdown.cli.shared_options import (
     SENSOR,
     FixFlags,
@@ -201,9 +203,6 @@ def _propose(
     vehicle. `question`: above what the user is to confirm, with braces for the file; no list if
     empty.
     """
-    from strapdown.cli.console import console, print_findings, progress
-    from strapdown.cli.result_folder import refuse_result
-
     usual = "case.toml" if command == "crash" else f"{command}.toml"
     if out.is_dir() or command != "crash":
         _check_free(out, usual, force=force)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from strapdown.cli.console import print_table, tell
 from strapdown.cli.shared_options import (
     Quiet,
     folder_to_make,
@@ -18,6 +19,7 @@ from strapdown.cli.shared_options import (
     spread,
     with_what,
 )
+from strapdown.errors import ConfigError, Finding
 
 if TYPE_CHECKING:
     from strapdown.live.hub import Hub
@@ -137,11 +139,9 @@ def live(
     used, which every other command reads as a log. States are written to standard output, one a
     line, all else to standard error.
     """
-    from strapdown.cli.console import tell
     from strapdown.cli.live_folder import warner
     from strapdown.cli.navigate_live import line_writer
     from strapdown.config.navigation import NavigationSpec
-    from strapdown.errors import ConfigError, Finding
     from strapdown.live.hub import StateWriter
     from strapdown.live.many import LiveSources, receive_many
     from strapdown.live.replay import MachineClock
@@ -188,8 +188,6 @@ def live(
 
 def show_qr(address: str) -> None:
     """Show an address as a QR code on standard error."""
-    from strapdown.errors import ConfigError
-
     try:
         import segno
     except ImportError:
@@ -207,8 +205,6 @@ def _print_sessions(hub: Hub, command: str) -> None:
     `command`: makes the sealed result of a session, which is a log.
     """
     from contextlib import redirect_stdout
-
-    from strapdown.cli.console import print_table
 
     rows = []
     for told in hub.ended:

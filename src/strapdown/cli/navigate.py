@@ -9,6 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from strapdown.cli.console import WORDS
+from strapdown.cli.result_folder import (
+    claim,
+    folder_to_write,
+    refuse_result,
+    run_and_save,
+    source_name,
+)
 from strapdown.cli.shared_options import (
     LOG_FLAGS,
     FixFlags,
@@ -154,14 +162,6 @@ def navigate(
 ) -> None:
     """Find position, velocity and attitude over a record, by inertial sensors and measurements."""
     from strapdown.bundle import write_latency
-    from strapdown.cli.console import WORDS
-    from strapdown.cli.result_folder import (
-        claim,
-        folder_to_write,
-        refuse_result,
-        run_and_save,
-        source_name,
-    )
     from strapdown.config.navigation import NavigationSpec
     from strapdown.systems.navigation_run import run_navigation
 

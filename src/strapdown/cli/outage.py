@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from strapdown.cli.console import WORDS, console, print_blocks, print_findings
+from strapdown.cli.result_folder import folder_to_write, run_and_save, source_name
 from strapdown.cli.shared_options import (
     BEGIN,
     END,
@@ -152,8 +154,6 @@ def outage(
     For a sensor the prediction uses its data sheet and a stated motion. For a navigation run it
     uses the filter's own state, and compares the prediction with the measured drifts.
     """
-    from strapdown.cli.console import WORDS
-    from strapdown.cli.result_folder import folder_to_write, run_and_save, source_name
     from strapdown.report.outage import read_run_of_outage
     from strapdown.systems.inputs import check_part
     from strapdown.systems.outage_run import run_outage
@@ -237,7 +237,6 @@ def _with(place: str) -> str:
 
 def print_outage(result: OutageRun) -> None:
     """Print the predicted drift, its sources, the measured drifts, and the findings."""
-    from strapdown.cli.console import console, print_blocks, print_findings
     from strapdown.report import outage_document as words
     from strapdown.report.outage_document import budget_table, drift_table, time_table
     from strapdown.report.values import spaced

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from strapdown.cli.console import console, print_blocks, print_findings
+from strapdown.cli.console import progress as bar
+from strapdown.cli.result_folder import run_and_save
 from strapdown.cli.shared_options import ReportFlags, as_flag, running, spread, writing
 from strapdown.errors import ConfigError
 
@@ -46,8 +49,6 @@ def sensors(
     in an outage (standard deviations against time).
     """
     from strapdown.bundle import to_json
-    from strapdown.cli.console import print_findings
-    from strapdown.cli.result_folder import run_and_save
     from strapdown.config.outage import SensorsSpec
     from strapdown.config.spec import specify
     from strapdown.report import sensors as report
@@ -89,7 +90,6 @@ def sensors(
     if out is not None:
         run_and_save(compute, out, write, "sensors.json", show)
         return
-    from strapdown.cli.console import progress as bar
 
     with bar(write.quiet or write.json) as reported:
         run = compute(reported)
@@ -100,7 +100,6 @@ def sensors(
 
 
 def _print(block: Any) -> None:
-    from strapdown.cli.console import console, print_blocks
     from strapdown.report.values import spaced
 
     if block.title:

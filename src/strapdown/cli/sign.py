@@ -9,7 +9,9 @@ from typing import Annotated
 
 import typer
 
+from strapdown.cli.console import console
 from strapdown.cli.shared_options import Quiet, Verbose, option
+from strapdown.errors import ConfigError
 
 EPILOG = (
     "Example: strapdown sign --new-key expert.pem\n\n"
@@ -41,8 +43,6 @@ def sign(
     """
     from strapdown.bundle.signature import new_key as make_key
     from strapdown.bundle.signature import sign as sign_bundle
-    from strapdown.cli.console import console
-    from strapdown.errors import ConfigError
 
     if (folder is None) == (new_key is None) or (folder is None) != (key is None):
         raise ConfigError("cli.sign-what", quantity="DIR, --key or --new-key")

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from strapdown.cli.console import WORDS, console, print_seal, progress
+from strapdown.cli.result_folder import claim, folder_to_write
 from strapdown.cli.shared_options import OutFlags, folder_to_make, running, spread, writing
 
 EPILOG = "Example: strapdown simulate alexiev-fig4 --rate 100 --format all --out fig4"
@@ -67,8 +69,6 @@ def simulate(
 ) -> None:
     """Write the log of a scenario, a trajectory or a crash together with its exact truth."""
     from strapdown.api.simulation import simulate as run_simulation
-    from strapdown.cli.console import WORDS, console, print_seal, progress
-    from strapdown.cli.result_folder import claim, folder_to_write
 
     own = name.lower().endswith(".toml")
     WORDS.set("file" if own else "cli")

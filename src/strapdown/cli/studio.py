@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from strapdown.cli.console import console, print_findings
 from strapdown.cli.shared_options import running, with_what
+from strapdown.errors import Finding
 
 if TYPE_CHECKING:
     from strapdown.studio.server import Address
@@ -64,16 +66,12 @@ def studio(
     process of its own, and writes what the command writes. Ctrl-C ends the server; a run that has
     begun goes on to its end.
     """
-    from strapdown.cli.console import console
     from strapdown.studio.server import serve
 
     out = console()
 
     def started(address: Address) -> None:
         if listen:
-            from strapdown.cli.console import print_findings
-            from strapdown.errors import Finding
-
             print_findings([Finding("studio.listening", folder=address.folder)])
         out.print(f"Studio of {address.folder}")
         out.print(f"Open   {address.url}")

@@ -8,7 +8,9 @@ from typing import Annotated
 
 import typer
 
+from strapdown.cli.console import WORDS, console, progress
 from strapdown.cli.shared_options import Json, Quiet, Verbose, option, writing
+from strapdown.errors import ConfigError
 
 EPILOG = "Example: strapdown verify alexiev-fig4-attitude"
 CHANGED, IN_PART = 6, 7
@@ -42,8 +44,6 @@ def verify(
     """
     from strapdown.bundle import to_json
     from strapdown.bundle.atomic_folder import replace_file
-    from strapdown.cli.console import WORDS, console, progress
-    from strapdown.errors import ConfigError
     from strapdown.report.verify import verification_page
     from strapdown.report.verify import verify as check
 

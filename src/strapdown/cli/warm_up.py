@@ -6,7 +6,9 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from strapdown.cli.console import console
 from strapdown.cli.shared_options import Quiet, Verbose
+from strapdown.errors import ConfigError
 
 EPILOG = "Example: strapdown warm-up"
 
@@ -18,9 +20,7 @@ def warm_up(*, quiet: Quiet = False, verbose: Verbose = False) -> None:
     kernel that is called: here the demonstration is run for that, into a folder that is removed.
     """
     from strapdown._kernels.compilation import MODE, NOT_KEPT
-    from strapdown.cli.console import console
     from strapdown.cli.demo import demo_runs, made
-    from strapdown.errors import ConfigError
 
     if MODE == "compiled":
         said = "delivered compiled: the first run is as fast as a later one"

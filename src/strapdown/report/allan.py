@@ -28,7 +28,7 @@ from strapdown.report.document import (
 )
 from strapdown.report.report_bundle import bundle_by_specification, finite, with_page
 from strapdown.report.values import duration_words
-from strapdown.sensors.bridge import target_of
+from strapdown.sensors.bridge import TARGETS, target_of
 from strapdown.sensors.noise_terms import NoiseTerm
 from strapdown.systems.allan_run import AllanRun, run_allan
 from strapdown.tables import ACCEL, GYRO
@@ -206,8 +206,6 @@ def parameter_table(result: AllanRun) -> TableBlock | None:
 
 def allan_document(result: AllanRun, name: str = "") -> Document:
     """Return the report of the noise of a sensor."""
-    from strapdown.sensors.bridge import TARGETS
-
     chosen = parameter_table(result)
     rows = tuple(
         (title.title, f"strapdown allan {result.name} --for {key}")
