@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from strapdown.cli.console import WORDS, console, print_blocks, print_findings
 from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save, source_name
 from strapdown.cli.shared_options import (
+    HEIGHT,
     LOG_FLAGS,
+    LONGITUDE,
+    SENSOR_MODEL,
     FixFlags,
-    Height,
     LogFlags,
-    Longitude,
     ReportFlags,
-    Sensor,
     as_flag,
     fix_flags,
     fix_keys,
@@ -48,34 +48,24 @@ MOST = 6  # findings on the terminal
 class AlignFlags:
     """Position, sensor and method of an alignment."""
 
-    lat: Annotated[float | None, with_what("DEG", "Latitude, north positive.")] = None
-    lon: Longitude = None
-    alt: Height = None
-    sensor: Sensor = None
-    method: Annotated[
-        str,
-        running(
-            "NAME",
-            "Coarse alignment, with options after a colon: inertial_frame (the body may "
-            "rock), two_vector, levelling, known_heading:heading_deg=90,sd_deg=1, gnss_course "
-            "(inertial_frame).",
-            show_default=False,
-        ),
-    ] = "inertial_frame"
-    coarse_only: Annotated[bool, running(None, "No fine alignment after it.", "--coarse-only")] = (
-        False
+    lat: float | None = with_what("DEG", "Latitude, north positive.")
+    lon: float | None = LONGITUDE
+    alt: float | None = HEIGHT
+    sensor: str | None = SENSOR_MODEL
+    method: str = running(
+        "NAME",
+        "Coarse alignment, with options after a colon: inertial_frame (the body may "
+        "rock), two_vector, levelling, known_heading:heading_deg=90,sd_deg=1, gnss_course "
+        "(inertial_frame).",
+        default="inertial_frame",
     )
-    gnss: Annotated[
-        Path | None, running("FIXES", "Fixes of a satellite receiver, for --method gnss_course.")
-    ] = None
-    prefilter: Annotated[
-        str,
-        running(
-            "NAME",
-            "Pre-filter of the samples, with options after a colon: robust_fir:rate_hz=100 (none).",
-            show_default=False,
-        ),
-    ] = "none"
+    coarse_only: bool = running(None, "No fine alignment after it.", "--coarse-only", default=False)
+    gnss: Path | None = running("FIXES", "Fixes of a satellite receiver, for --method gnss_course.")
+    prefilter: str = running(
+        "NAME",
+        "Pre-filter of the samples, with options after a colon: robust_fir:rate_hz=100 (none).",
+        default="none",
+    )
 
 
 #: Flags by key path of the specification.
@@ -94,19 +84,15 @@ FLAGS = {
 
 @spread
 def align(
-    source: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOG|CONFIG.toml",
-            help="A log of gyros and accelerometers of a stationary body, or the file of an "
-            "alignment.",
-        ),
-    ],
-    flags: AlignFlags,
+    source: Path = typer.Argument(
+        metavar="LOG|CONFIG.toml",
+        help="A log of gyros and accelerometers of a stationary body, or the file of an alignment.",
+    ),
     *,
+    flags: AlignFlags,
     log: LogFlags,
     fixes: FixFlags,
-    out: Annotated[Path | None, folder_to_make("LOG-align")] = None,
+    out: Path | None = folder_to_make("LOG-align"),
     write: ReportFlags,
 ) -> None:
     """Find roll, pitch and heading of a stationary body from its gyros and accelerometers.

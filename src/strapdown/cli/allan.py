@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -34,36 +34,29 @@ MOST = 4  # findings on the terminal
 
 @spread
 def allan(
-    logs: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="LOG...",
-            help="Log of an unmoved sensor, an hour or more; several logs of one sensor are "
-            "fitted together.",
-        ),
-    ],
-    program: Annotated[
-        str | None,
-        running(
-            "PROGRAM",
-            "Print the noise as the parameters of another program, too: KF-GINS, OB_GINS, GTSAM, "
-            "kalibr, ORB-SLAM3, robot_localization, PX4, NaveGo, PSINS, data-sheet.",
-            "--for",
-        ),
-    ] = None,
-    at_rest: Annotated[
-        bool,
-        running(
-            None, "Use the whole log, or its part, as stationary, without a test.", "--at-rest"
-        ),
-    ] = False,
-    sensor_file: Annotated[
-        Path | None,
-        writing("FILE.toml", "Write the sensor here, for --sensor of navigate and align."),
-    ] = None,
+    logs: list[Path] = typer.Argument(
+        metavar="LOG...",
+        help="Log of an unmoved sensor, an hour or more; several logs of one sensor are "
+        "fitted together.",
+    ),
+    program: str | None = running(
+        "PROGRAM",
+        "Print the noise as the parameters of another program, too: KF-GINS, OB_GINS, GTSAM, "
+        "kalibr, ORB-SLAM3, robot_localization, PX4, NaveGo, PSINS, data-sheet.",
+        "--for",
+    ),
+    at_rest: bool = running(
+        None,
+        "Use the whole log, or its part, as stationary, without a test.",
+        "--at-rest",
+        default=False,
+    ),
+    sensor_file: Path | None = writing(
+        "FILE.toml", "Write the sensor here, for --sensor of navigate and align."
+    ),
     *,
     flags: LogFlags,
-    out: Annotated[Path | None, folder_to_make("LOG-allan")] = None,
+    out: Path | None = folder_to_make("LOG-allan"),
     write: ReportFlags,
 ) -> None:
     """Find the noise of a sensor from a log at rest: Allan deviation, noise terms, sensor file.

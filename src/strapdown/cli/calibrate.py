@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from strapdown.cli.console import console, print_blocks, print_findings
 from strapdown.cli.result_folder import file_beside, folder_to_write, refuse_result, run_and_save
 from strapdown.cli.shared_options import (
-    Height,
+    HEIGHT,
+    SENSOR_MODEL,
     LogFlags,
     ReportFlags,
-    Sensor,
     as_flag,
     flags_by_key,
     folder_to_make,
@@ -49,40 +49,30 @@ KEYS = {
 class ProcedureFlags:
     """What was done with the sensor, and what is known of it."""
 
-    procedure: Annotated[
-        str | None,
-        running(
-            "KIND",
-            "positions (rests in nine or more poses), six-position (each face up), turns (by known "
-            "angles), rate-table; by the logs if not given.",
-        ),
-    ] = None
-    turns: Annotated[
-        str | None,
-        running(
-            "ANGLES|TABLE.csv",
-            "Known rotations: 360, every turn of about 360 deg between stops; 'x 720, y 720', in "
-            "order; or a table: axis, angle_deg or rate_deg_per_s, sd_deg, log, from_s, to_s.",
-        ),
-    ] = None
-    turn_sd_deg: Annotated[
-        float | None, running("DEG", "Standard deviation of the known angles (3).", "--turn-sd")
-    ] = None
-    pose_sd_deg: Annotated[
-        float | None,
-        running("DEG", "Standard deviation of the faces in six positions (2).", "--pose-sd"),
-    ] = None
-    gravity_m_per_s2: Annotated[
-        float | None,
-        with_what(
-            "M/S2",
-            "Local gravity, 9.8123; by --lat and --alt, or the Earth's mean, if not given.",
-            "--gravity",
-        ),
-    ] = None
-    lat: Annotated[float | None, with_what("DEG", "Latitude, north positive.")] = None
-    alt: Height = None
-    sensor: Sensor = None
+    procedure: str | None = running(
+        "KIND",
+        "positions (rests in nine or more poses), six-position (each face up), turns (by known "
+        "angles), rate-table; by the logs if not given.",
+    )
+    turns: str | None = running(
+        "ANGLES|TABLE.csv",
+        "Known rotations: 360, every turn of about 360 deg between stops; 'x 720, y 720', in "
+        "order; or a table: axis, angle_deg or rate_deg_per_s, sd_deg, log, from_s, to_s.",
+    )
+    turn_sd_deg: float | None = running(
+        "DEG", "Standard deviation of the known angles (3).", "--turn-sd"
+    )
+    pose_sd_deg: float | None = running(
+        "DEG", "Standard deviation of the faces in six positions (2).", "--pose-sd"
+    )
+    gravity_m_per_s2: float | None = with_what(
+        "M/S2",
+        "Local gravity, 9.8123; by --lat and --alt, or the Earth's mean, if not given.",
+        "--gravity",
+    )
+    lat: float | None = with_what("DEG", "Latitude, north positive.")
+    alt: float | None = HEIGHT
+    sensor: str | None = SENSOR_MODEL
 
 
 FLAGS = flags_by_key(ProcedureFlags) | {"lat_deg": "--lat", "alt_m": "--alt"}
@@ -90,16 +80,16 @@ FLAGS = flags_by_key(ProcedureFlags) | {"lat_deg": "--lat", "alt_m": "--alt"}
 
 @spread
 def calibrate(
-    logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="Logs of one sensor, at rest in poses.")
-    ],
+    logs: list[Path] = typer.Argument(
+        metavar="LOG...", help="Logs of one sensor, at rest in poses."
+    ),
     *,
     asked: ProcedureFlags,
     flags: LogFlags,
-    calibration_file: Annotated[
-        Path | None, writing("FILE.toml", "Write the calibration here, for --calibration.")
-    ] = None,
-    out: Annotated[Path | None, folder_to_make("LOG-calibrate")] = None,
+    calibration_file: Path | None = writing(
+        "FILE.toml", "Write the calibration here, for --calibration."
+    ),
+    out: Path | None = folder_to_make("LOG-calibrate"),
     write: ReportFlags,
 ) -> None:
     """Find bias, scale, misalignment and g-sensitivity of a sensor from rests and turns.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from typer.core import TyperGroup
@@ -44,21 +44,16 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-WorkersFlag = Annotated[
-    int | None, running("N", "Cases at a time (the cores of this machine).", "--workers", min=1)
-]
-Scheduler = Annotated[
-    str | None,
-    running(
-        "ADDRESS",
-        "Scheduler of dask, tcp://HOST:8786, instead of this machine; its workers are those of "
-        "strapdown worker.",
-    ),
-]
-Dashboard = Annotated[
-    bool, running(None, "Serve the dashboard of dask on the loopback interface.", "--dashboard")
-]
-Folder = Annotated[Path, typer.Argument(metavar="DIR", help=DIR)]
+WORKERS = running("N", "Cases at a time (the cores of this machine).", "--workers", min=1)
+SCHEDULER = running(
+    "ADDRESS",
+    "Scheduler of dask, tcp://HOST:8786, instead of this machine; its workers are those of "
+    "strapdown worker.",
+)
+DASHBOARD = running(
+    None, "Serve the dashboard of dask on the loopback interface.", "--dashboard", default=False
+)
+FOLDER = typer.Argument(metavar="DIR", help=DIR)
 
 
 @app.callback(epilog=EPILOG)
@@ -73,16 +68,15 @@ def campaign() -> None:
 @app.command("run")
 @spread
 def run(
-    file: Annotated[Path, typer.Argument(metavar="CAMPAIGN.toml", help="File of the campaign.")],
+    file: Path = typer.Argument(metavar="CAMPAIGN.toml", help="File of the campaign."),
     *,
-    workers: WorkersFlag = None,
-    scheduler: Scheduler = None,
-    part: Annotated[
-        str | None,
-        running("K/N", "Run the K-th of N parts of the cases alone; merge puts them together."),
-    ] = None,
-    dashboard: Dashboard = False,
-    out: Annotated[Path | None, folder_to_make("CAMPAIGN-campaign")] = None,
+    workers: int | None = WORKERS,
+    scheduler: str | None = SCHEDULER,
+    part: str | None = running(
+        "K/N", "Run the K-th of N parts of the cases alone; merge puts them together."
+    ),
+    dashboard: bool = DASHBOARD,
+    out: Path | None = folder_to_make("CAMPAIGN-campaign"),
     write: ReportFlags,
 ) -> None:
     """Run a campaign from its file."""
@@ -109,11 +103,11 @@ def run(
 @app.command("resume")
 @spread
 def resume(
-    folder: Folder,
+    folder: Path = FOLDER,
     *,
-    workers: WorkersFlag = None,
-    scheduler: Scheduler = None,
-    dashboard: Dashboard = False,
+    workers: int | None = WORKERS,
+    scheduler: str | None = SCHEDULER,
+    dashboard: bool = DASHBOARD,
     write: ReportFlags,
 ) -> None:
     """Go on with a campaign that was ended: the cases without a result are run."""
@@ -190,12 +184,10 @@ def _counted(report: Stopwatch) -> Progress:
 
 @app.command("merge")
 def merge(
-    folders: Annotated[
-        list[Path], typer.Argument(metavar="DIR...", help="Folders of the parts of one campaign.")
-    ],
-    out: Annotated[
-        Path, writing("DIR", "Folder of the merged campaign.", "--out", show_default=False)
-    ],
+    folders: list[Path] = typer.Argument(
+        metavar="DIR...", help="Folders of the parts of one campaign."
+    ),
+    out: Path = writing("DIR", "Folder of the merged campaign.", "--out", default=...),
 ) -> None:
     """Put the parts of a campaign from several machines together; resume completes it."""
     from strapdown.campaign.run import WORKING, merge_parts
@@ -208,8 +200,8 @@ def merge(
 
 @app.command("status")
 def status(
-    folder: Folder,
-    as_json: Annotated[bool, writing(None, "Print as JSON, for programs.", "--json")] = False,
+    folder: Path = FOLDER,
+    as_json: bool = writing(None, "Print as JSON, for programs.", "--json", default=False),
 ) -> None:
     """Show how many cases of a campaign are done, and what became of them."""
     from strapdown.campaign.run import open_campaign
@@ -240,10 +232,8 @@ def status(
 
 @app.command("report")
 def report(
-    folder: Folder,
-    out: Annotated[
-        Path | None, writing("FILE.html", "Page to write (DIR-report.html).", "--out")
-    ] = None,
+    folder: Path = FOLDER,
+    out: Path | None = writing("FILE.html", "Page to write (DIR-report.html).", "--out"),
 ) -> None:
     """Write the page of a campaign as it is now, complete or not."""
     from strapdown.campaign.run import report_now
@@ -255,12 +245,10 @@ def report(
 
 @app.command("case")
 def case(
-    folder: Folder,
-    number: Annotated[int, typer.Argument(metavar="CASE", help="Number of the case.", min=0)],
-    out: Annotated[
-        Path | None, writing("DIR", "Folder to create (DIR-case-CASE).", "--out")
-    ] = None,
-    force: Annotated[bool, writing(None, "Overwrite an existing result.", "--force")] = False,
+    folder: Path = FOLDER,
+    number: int = typer.Argument(metavar="CASE", help="Number of the case.", min=0),
+    out: Path | None = writing("DIR", "Folder to create (DIR-case-CASE).", "--out"),
+    force: bool = writing(None, "Overwrite an existing result.", "--force", default=False),
 ) -> None:
     """Run one case by itself, to the same bits, with its full report."""
     from strapdown.campaign.run import case_of, differing, open_campaign, save_case

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -26,19 +26,13 @@ CHANGED = 6
 
 @spread
 def compare(
-    runs: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RUN...",
-            help="Folders of results, of any command; or configurations (.toml) of navigate, align "
-            "or crash, which are run first.",
-        ),
-    ],
+    runs: list[Path] = typer.Argument(
+        metavar="RUN...",
+        help="Folders of results, of any command; or configurations (.toml) of navigate, align "
+        "or crash, which are run first.",
+    ),
     *,
-    out: Annotated[
-        Path | None,
-        writing("DIR", "Write a page, the data and the runs into this folder."),
-    ] = None,
+    out: Path | None = writing("DIR", "Write a page, the data and the runs into this folder."),
     write: ReportFlags,
 ) -> None:
     """Show what differs between results: options, inputs, numbers, and positions over time.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
@@ -33,47 +33,35 @@ EPILOG = (
 class TargetFlags:
     """Format of the result, and what it needs that no log states."""
 
-    form: Annotated[
-        str | None,
-        writing(
-            "FORMAT",
-            "Format of OUT (strapdown modules), if its ending does not say it: euroc, kitti, "
-            "kf-gins are folders.",
-            "--as",
-        ),
-    ] = None
-    streams: Annotated[
-        str | None,
-        writing("NAMES", "Only these: imu,gnss,reference,magnetometer,barometer,wheel,heading."),
-    ] = None
-    epoch: Annotated[
-        str | None,
-        writing("DATE", "Instant of stamp zero, for a clock that is not related to UTC."),
-    ] = None
-    origin: Annotated[
-        str | None,
-        writing(
-            "LAT,LON,HEIGHT",
-            "Origin of formats with local axes, deg, deg, m over the ellipsoid (first position).",
-        ),
-    ] = None
-    geoid: Annotated[
-        float | None,
-        writing("M", "Height of the geoid over the ellipsoid, for heights over the sea."),
-    ] = None
+    form: str | None = writing(
+        "FORMAT",
+        "Format of OUT (strapdown modules), if its ending does not say it: euroc, kitti, "
+        "kf-gins are folders.",
+        "--as",
+    )
+    streams: str | None = writing(
+        "NAMES", "Only these: imu,gnss,reference,magnetometer,barometer,wheel,heading."
+    )
+    epoch: str | None = writing(
+        "DATE", "Instant of stamp zero, for a clock that is not related to UTC."
+    )
+    origin: str | None = writing(
+        "LAT,LON,HEIGHT",
+        "Origin of formats with local axes, deg, deg, m over the ellipsoid (first position).",
+    )
+    geoid: float | None = writing(
+        "M", "Height of the geoid over the ellipsoid, for heights over the sea."
+    )
 
 
 @spread
 def convert(
-    paths: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="IN... OUT",
-            help="Logs, fixes, trajectories or results, and the file or folder to make.",
-        ),
-    ],
-    target: TargetFlags,
+    paths: list[Path] = typer.Argument(
+        metavar="IN... OUT",
+        help="Logs, fixes, trajectories or results, and the file or folder to make.",
+    ),
     *,
+    target: TargetFlags,
     log: LogFlags,
     fixes: FixFlags,
     write: OutFlags,

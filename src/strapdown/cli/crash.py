@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -19,9 +19,9 @@ from strapdown.cli.console import (
 )
 from strapdown.cli.result_folder import claim, folder_to_write, refuse_result
 from strapdown.cli.shared_options import (
-    Recover,
+    RECOVER,
+    TOKEN,
     ReportFlags,
-    Token,
     folder_to_make,
     missing_argument,
     running,
@@ -43,51 +43,37 @@ EPILOG = (
 class LiveFlags:
     """Detection while samples arrive, and on a microcontroller."""
 
-    live: Annotated[
-        str | None,
-        running(
-            "-|udp://HOST:PORT",
-            "Detect a crash in samples as they come, as lines of standard input or of datagrams, "
-            "by the recorder of the case.",
-        ),
-    ] = None
-    every: Annotated[
-        float | None,
-        running("S", "With --live: an estimate of an event so often (0.01).", show_default=False),
-    ] = None
-    calibration: Annotated[
-        Path | None,
-        running(
-            "RESULT",
-            "With --live or --export: a result of strapdown crash in which the drive determined "
-            "biases, scale factors and mounting of the recorder; they are taken off.",
-        ),
-    ] = None
-    token: Token = None
-    recover: Recover = None
-    export: Annotated[
-        Path | None,
-        writing(
-            "FILE.c",
-            "Write the detection of --live for the recorder of the case as C99, with a test "
-            "vector, and nothing else.",
-        ),
-    ] = None
+    live: str | None = running(
+        "-|udp://HOST:PORT",
+        "Detect a crash in samples as they come, as lines of standard input or of datagrams, "
+        "by the recorder of the case.",
+    )
+    every: float | None = running("S", "With --live: an estimate of an event so often (0.01).")
+    calibration: Path | None = running(
+        "RESULT",
+        "With --live or --export: a result of strapdown crash in which the drive determined "
+        "biases, scale factors and mounting of the recorder; they are taken off.",
+    )
+    token: str | None = TOKEN
+    recover: Path | None = RECOVER
+    export: Path | None = writing(
+        "FILE.c",
+        "Write the detection of --live for the recorder of the case as C99, with a test "
+        "vector, and nothing else.",
+    )
 
 
 @spread
 def crash(
-    cases: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            metavar="CASE.toml...",
-            help="The case of each vehicle; strapdown init crash writes them.",
-            show_default=False,
-        ),
-    ] = None,
+    cases: list[Path] | None = typer.Argument(
+        None,
+        metavar="CASE.toml...",
+        help="The case of each vehicle; strapdown init crash writes them.",
+        show_default=False,
+    ),
     *,
     flags: LiveFlags,
-    out: Annotated[Path | None, folder_to_make("CASE-crash, with --live CASE-crash-live")] = None,
+    out: Path | None = folder_to_make("CASE-crash, with --live CASE-crash-live"),
     write: ReportFlags,
 ) -> None:
     """Reconstruct a crash: delta-V, direction of force, severity and path, each with its bound.

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from strapdown.cli.console import console
 from strapdown.cli.result_folder import claim
@@ -30,7 +30,7 @@ _RECORDING = "phone-recording"
 @spread
 def demo(
     *,
-    out: Annotated[Path, folder_to_make("demo")] = Path("demo"),
+    out: Path = folder_to_make("demo", default=Path("demo")),
     write: WriteFlags,
 ) -> None:
     """Run all systems and show the results on one page: navigation, attitude, crash.

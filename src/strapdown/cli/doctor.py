@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -38,22 +38,18 @@ MOST, WIDTH = 8, 300
 
 @spread
 def doctor(
-    logs: Annotated[
-        list[Path],
-        typer.Argument(metavar="LOG…", help="Logs, or folders of recordings.", show_default=False),
-    ],
-    fix: Annotated[
-        Path | None,
-        writing(
-            "FILE",
-            "Write a clean log (.parquet or .csv): SI, body axes, increasing stamps; other streams "
-            "and the record of what was done beside it.",
-        ),
-    ] = None,
+    logs: list[Path] = typer.Argument(
+        metavar="LOG…", help="Logs, or folders of recordings.", show_default=False
+    ),
+    fix: Path | None = writing(
+        "FILE",
+        "Write a clean log (.parquet or .csv): SI, body axes, increasing stamps; other streams "
+        "and the record of what was done beside it.",
+    ),
     *,
     flags: LogFlags,
     fixes: FixFlags,
-    out: Annotated[Path | None, folder_to_make("LOG-doctor")] = None,
+    out: Path | None = folder_to_make("LOG-doctor"),
     write: ReportFlags,
 ) -> None:
     """Examine logs: what is in them, what is wrong, the fix, and what they suffice for.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -19,17 +18,13 @@ EPILOG = (
 
 @spread
 def export(
-    module: Annotated[
-        str,
-        typer.Argument(
-            metavar="MODULE",
-            help="What to write, with its options, such as ned:height=damped (strapdown modules).",
-        ),
-    ],
-    file: Annotated[
-        Path,
-        typer.Argument(metavar="FILE", help="FILE.c: C99; FILE.py: MicroPython, of an attitude."),
-    ],
+    module: str = typer.Argument(
+        metavar="MODULE",
+        help="What to write, with its options, such as ned:height=damped (strapdown modules).",
+    ),
+    file: Path = typer.Argument(
+        metavar="FILE", help="FILE.c: C99; FILE.py: MicroPython, of an attitude."
+    ),
     *,
     write: OutFlags,
 ) -> None:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from strapdown.cli.console import console, print_blocks, print_findings
 from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
 from strapdown.cli.shared_options import (
+    SENSOR_MODEL,
     FixFlags,
     LogFlags,
     ReportFlags,
-    Sensor,
     as_flag,
     fix_flags,
     fix_keys,
@@ -42,50 +42,42 @@ MOST = 6  # findings on the terminal
 class PairFlags:
     """The other sensor, and what is known of both, by argument of `find`."""
 
-    kind: Annotated[
-        str | None,
-        running("imu|magnetometer|gnss", "What OTHER is, if it is not found.", "--kind"),
-    ] = None
-    offset: Annotated[
-        float | None,
-        running("S", "Clock of OTHER less that of LOG, to 0.3 s; searched, if not given."),
-    ] = None
-    not_on_wheels: Annotated[
-        bool,
-        running(
-            None, "With fixes: the vehicle does not roll; no mounting angles.", "--not-on-wheels"
-        ),
-    ] = False
-    sensor: Sensor = None
-    other_axes: Annotated[
-        str | None, running("X,Y,Z", "Axes of OTHER, as --axes of LOG.", "--other-axes")
-    ] = None
-    other_calibration: Annotated[
-        Path | None,
-        running("FILE.toml", "Of OTHER, as --calibration of LOG.", "--other-calibration"),
-    ] = None
-    heading_deg: Annotated[
-        float | None,
-        with_what("DEG", "Initial heading, if neither gyros nor course determine it.", "--heading"),
-    ] = None
+    kind: str | None = running(
+        "imu|magnetometer|gnss", "What OTHER is, if it is not found.", "--kind"
+    )
+    offset: float | None = running(
+        "S", "Clock of OTHER less that of LOG, to 0.3 s; searched, if not given."
+    )
+    not_on_wheels: bool = running(
+        None,
+        "With fixes: the vehicle does not roll; no mounting angles.",
+        "--not-on-wheels",
+        default=False,
+    )
+    sensor: str | None = SENSOR_MODEL
+    other_axes: str | None = running("X,Y,Z", "Axes of OTHER, as --axes of LOG.", "--other-axes")
+    other_calibration: Path | None = running(
+        "FILE.toml", "Of OTHER, as --calibration of LOG.", "--other-calibration"
+    )
+    heading_deg: float | None = with_what(
+        "DEG", "Initial heading, if neither gyros nor course determine it.", "--heading"
+    )
 
 
 @spread
 def extrinsics(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="Log of gyros and accelerometers, a.")],
-    other: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="OTHER",
-            help="The other sensor, b: a second log, a magnetometer, fixes of an antenna; without "
-            "it, the magnetometer in LOG.",
-        ),
-    ] = None,
+    log: Path = typer.Argument(metavar="LOG", help="Log of gyros and accelerometers, a."),
+    other: Path | None = typer.Argument(
+        None,
+        metavar="OTHER",
+        help="The other sensor, b: a second log, a magnetometer, fixes of an antenna; without "
+        "it, the magnetometer in LOG.",
+    ),
     *,
     asked: PairFlags,
     flags: LogFlags,
     fixes: FixFlags,
-    out: Annotated[Path | None, folder_to_make("LOG-extrinsics")] = None,
+    out: Path | None = folder_to_make("LOG-extrinsics"),
     write: ReportFlags,
 ) -> None:
     """Find rotation, lever arm and time offset between two sensors on one rigid body.

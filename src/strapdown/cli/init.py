@@ -7,18 +7,18 @@ import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from strapdown.cli.console import console, print_findings, progress
 from strapdown.cli.result_folder import refuse_result
 from strapdown.cli.shared_options import (
+    QUIET,
     SENSOR,
+    VERBOSE,
     FixFlags,
     LogFlags,
-    Quiet,
-    Verbose,
     fix_keys,
     log_keys,
     running,
@@ -50,11 +50,11 @@ app = typer.Typer(
 )
 
 
-def _file_to_write(name: str) -> Any:
-    return writing("FILE", f"File to write ({name}).", show_default=False)
+def _file_to_write(name: str, default: Path | None = None) -> Any:
+    return writing("FILE", f"File to write ({name}).", default=default)
 
 
-Force = Annotated[bool, writing(None, "Overwrite an existing file.", "--force")]
+FORCE = writing(None, "Overwrite an existing file.", "--force", default=False)
 
 
 @app.callback(epilog=EPILOG)
@@ -64,19 +64,16 @@ def init() -> None:
 
 @app.command("crash", epilog=CRASH_EPILOG)
 def crash(
-    records: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RECORD",
-            help="Records of one crash: CSV or text tables of any layout, tables of an event data "
-            "recorder, the folder of a test (NHTSA, ISO MME).",
-            show_default=False,
-        ),
-    ],
-    out: Annotated[Path, _file_to_write("case.toml")] = Path("case.toml"),
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    records: list[Path] = typer.Argument(
+        metavar="RECORD",
+        help="Records of one crash: CSV or text tables of any layout, tables of an event data "
+        "recorder, the folder of a test (NHTSA, ISO MME).",
+        show_default=False,
+    ),
+    out: Path = _file_to_write("case.toml", default=Path("case.toml")),
+    force: bool = FORCE,
+    quiet: bool = QUIET,
+    verbose: bool = VERBOSE,
 ) -> None:
     """Propose the case file of a crash from its records, with questions for missing data.
 
@@ -97,18 +94,15 @@ def crash(
 @app.command("align", epilog=ALIGN_EPILOG)
 @spread
 def align(
-    log: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
-        ),
-    ],
+    log: Path = typer.Argument(
+        metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
+    ),
     *,
     flags: LogFlags,
-    out: Annotated[Path, _file_to_write("align.toml")] = Path("align.toml"),
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    out: Path = _file_to_write("align.toml", default=Path("align.toml")),
+    force: bool = FORCE,
+    quiet: bool = QUIET,
+    verbose: bool = VERBOSE,
 ) -> None:
     """Propose the configuration of an alignment from a log, with questions for missing data.
 
@@ -125,31 +119,26 @@ def align(
 @app.command("navigate", epilog=NAVIGATE_EPILOG)
 @spread
 def navigate(
-    log: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
-        ),
-    ],
-    beside: Annotated[
-        Path | None,
-        typer.Argument(metavar="[FIXES]", help="As --gnss.", show_default=False),
-    ] = None,
-    gnss: Annotated[Path | None, with_what("FIXES", "Fixes of a satellite receiver.")] = None,
-    sensor: Annotated[
-        str | None,
-        with_what("NAME|FILE", f"{SENSOR[:-1]}; the nearest by noise, if not given."),
-    ] = None,
-    foot: Annotated[
-        bool, running(None, "Foot-mounted unit: zero velocity at each stance.", "--foot")
-    ] = False,
+    log: Path = typer.Argument(
+        metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
+    ),
+    beside: Path | None = typer.Argument(
+        None, metavar="[FIXES]", help="As --gnss.", show_default=False
+    ),
+    gnss: Path | None = with_what("FIXES", "Fixes of a satellite receiver."),
+    sensor: str | None = with_what(
+        "NAME|FILE", f"{SENSOR[:-1]}; the nearest by noise, if not given."
+    ),
+    foot: bool = running(
+        None, "Foot-mounted unit: zero velocity at each stance.", "--foot", default=False
+    ),
     *,
     flags: LogFlags,
     fixes: FixFlags,
-    out: Annotated[Path, _file_to_write("navigate.toml")] = Path("navigate.toml"),
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    out: Path = _file_to_write("navigate.toml", default=Path("navigate.toml")),
+    force: bool = FORCE,
+    quiet: bool = QUIET,
+    verbose: bool = VERBOSE,
 ) -> None:
     """Propose the configuration of a navigation run from log and fixes.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -26,21 +26,15 @@ FLAGS = {"outage_s": "--outage", "speed_m_per_s": "--speed", "sensor": "NAME|FIL
 
 @spread
 def sensors(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="[NAME|FILE]...",
-            help="Sensors of the catalogue, or files of your own, as of strapdown allan.",
-        ),
-    ] = None,
+    names: list[str] | None = typer.Argument(
+        None,
+        metavar="[NAME|FILE]...",
+        help="Sensors of the catalogue, or files of your own, as of strapdown allan.",
+    ),
     *,
-    outage: Annotated[
-        float, running("S", "Duration of the outage (60).", show_default=False)
-    ] = 60.0,
-    speed: Annotated[float, running("M/S", "Speed (0: stationary).", show_default=False)] = 15.0,
-    out: Annotated[
-        Path | None, writing("DIR", "Write a page and the data into this folder.")
-    ] = None,
+    outage: float = running("S", "Duration of the outage (60).", default=60.0),
+    speed: float = running("M/S", "Speed (0: stationary).", default=15.0),
+    out: Path | None = writing("DIR", "Write a page and the data into this folder."),
     write: ReportFlags,
 ) -> None:
     """List the sensors of the catalogue, show one with its sources, or compare several.

@@ -5,12 +5,11 @@ from __future__ import annotations
 import sys
 from functools import partial
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from strapdown.cli.console import console
-from strapdown.cli.shared_options import Quiet, Verbose, option
+from strapdown.cli.shared_options import QUIET, VERBOSE, option
 from strapdown.errors import ConfigError
 
 EPILOG = (
@@ -21,20 +20,12 @@ signing = partial(option, "Key")
 
 
 def sign(
-    folder: Annotated[
-        Path | None, typer.Argument(metavar="DIR", help="A folder that a run wrote.")
-    ] = None,
-    key: Annotated[
-        Path | None, signing("FILE", "Secret key by Ed25519, as PEM or of OpenSSH.")
-    ] = None,
-    new_key: Annotated[
-        Path | None, signing("FILE", "Make a key; the public part becomes FILE.pub.")
-    ] = None,
-    password: Annotated[
-        bool, signing(None, "Ask for the password of the key.", "--password")
-    ] = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    folder: Path | None = typer.Argument(None, metavar="DIR", help="A folder that a run wrote."),
+    key: Path | None = signing("FILE", "Secret key by Ed25519, as PEM or of OpenSSH."),
+    new_key: Path | None = signing("FILE", "Make a key; the public part becomes FILE.pub."),
+    password: bool = signing(None, "Ask for the password of the key.", "--password", default=False),
+    quiet: bool = QUIET,
+    verbose: bool = VERBOSE,
 ) -> None:
     """Sign the seal of a result with your key, so that others can tell that it is yours.
 

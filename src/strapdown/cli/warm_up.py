@@ -7,13 +7,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from strapdown.cli.console import console
-from strapdown.cli.shared_options import Quiet, Verbose
+from strapdown.cli.shared_options import QUIET, VERBOSE
 from strapdown.errors import ConfigError
 
 EPILOG = "Example: strapdown warm-up"
 
 
-def warm_up(*, quiet: Quiet = False, verbose: Verbose = False) -> None:
+def warm_up(*, quiet: bool = QUIET, verbose: bool = VERBOSE) -> None:
     """Compile the kernels now instead of in the first runs, where they are not delivered compiled.
 
     An installation from a wheel has them compiled, and this says so. Elsewhere numba compiles each
