@@ -9,27 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from strapdown.cli import shared_options as options
 from strapdown.cli.console import WORDS, console, print_blocks, print_findings
 from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save, source_name
-from strapdown.cli.shared_options import (
-    HEIGHT,
-    LOG_FLAGS,
-    LONGITUDE,
-    SENSOR_MODEL,
-    FixFlags,
-    LogFlags,
-    ReportFlags,
-    as_flag,
-    fix_flags,
-    fix_keys,
-    folder_to_make,
-    log_keys,
-    module_of_flag,
-    refuse_beside_file,
-    running,
-    spread,
-    with_what,
-)
 from strapdown.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -48,20 +30,24 @@ MOST = 6  # findings on the terminal
 class AlignFlags:
     """Position, sensor and method of an alignment."""
 
-    lat: float | None = with_what("DEG", "Latitude, north positive.")
-    lon: float | None = LONGITUDE
-    alt: float | None = HEIGHT
-    sensor: str | None = SENSOR_MODEL
-    method: str = running(
+    lat: float | None = options.with_what("DEG", "Latitude, north positive.")
+    lon: float | None = options.LONGITUDE
+    alt: float | None = options.HEIGHT
+    sensor: str | None = options.SENSOR_MODEL
+    method: str = options.running(
         "NAME",
         "Coarse alignment, with options after a colon: inertial_frame (the body may "
         "rock), two_vector, levelling, known_heading:heading_deg=90,sd_deg=1, gnss_course "
         "(inertial_frame).",
         default="inertial_frame",
     )
-    coarse_only: bool = running(None, "No fine alignment after it.", "--coarse-only", default=False)
-    gnss: Path | None = running("FIXES", "Fixes of a satellite receiver, for --method gnss_course.")
-    prefilter: str = running(
+    coarse_only: bool = options.running(
+        None, "No fine alignment after it.", "--coarse-only", default=False
+    )
+    gnss: Path | None = options.running(
+        "FIXES", "Fixes of a satellite receiver, for --method gnss_course."
+    )
+    prefilter: str = options.running(
         "NAME",
         "Pre-filter of the samples, with options after a colon: robust_fir:rate_hz=100 (none).",
         default="none",
@@ -77,12 +63,12 @@ FLAGS = {
     "gnss, path": "--gnss",
     "coarse, kind": "--method",
     "prefilter, kind": "--prefilter",
-    **LOG_FLAGS,
-    **fix_flags("gnss"),
+    **options.LOG_FLAGS,
+    **options.fix_flags("gnss"),
 }
 
 
-@spread
+@options.spread
 def align(
     source: Path = typer.Argument(
         metavar="LOG|CONFIG.toml",
@@ -90,10 +76,10 @@ def align(
     ),
     *,
     flags: AlignFlags,
-    log: LogFlags,
-    fixes: FixFlags,
-    out: Path | None = folder_to_make("LOG-align"),
-    write: ReportFlags,
+    log: options.LogFlags,
+    fixes: options.FixFlags,
+    out: Path | None = options.folder_to_make("LOG-align"),
+    write: options.ReportFlags,
 ) -> None:
     """Find roll, pitch and heading of a stationary body from its gyros and accelerometers.
 
@@ -115,7 +101,7 @@ def align(
     refuse_result(source, "log")
     own = source.suffix.lower() == ".toml"
     if own:
-        refuse_beside_file(source, given, FLAGS)
+        options.refuse_beside_file(source, given, FLAGS)
         WORDS.set("file")
     asked = AlignmentSpec.read(source) if own else None
 
@@ -141,21 +127,21 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     from strapdown.config.spec import specify
 
     site = {"lat_deg": given["lat"], "lon_deg": given["lon"], "alt_m": given["alt"]}
-    keys, fixes = log_keys(given), fix_keys(given, given["gnss"])
+    keys, fixes = options.log_keys(given), options.fix_keys(given, given["gnss"])
     try:
         table = specify(LogTable, path=str(log), **keys)
         return specify_alignment(
             ImuFile(table, given["axes"]),
             site={key: float(value) for key, value in site.items() if value is not None},
             sensor=given["sensor"],
-            coarse=module_of_flag(given["method"] or "inertial_frame"),
+            coarse=options.module_of_flag(given["method"] or "inertial_frame"),
             fine=not given["coarse_only"],
             gnss={"path": str(log), **fixes} if fixes else None,
-            prefilter=module_of_flag(given["prefilter"] or "none"),
+            prefilter=options.module_of_flag(given["prefilter"] or "none"),
             called=lambda argument: f"--{argument}",
         )
     except ConfigError as error:
-        raise as_flag(error, FLAGS, _flag) from None
+        raise options.as_flag(error, FLAGS, _flag) from None
 
 
 def _flag(place: str) -> str:

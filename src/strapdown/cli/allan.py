@@ -7,18 +7,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from strapdown.cli import shared_options as options
 from strapdown.cli.console import console, print_blocks, print_findings
 from strapdown.cli.result_folder import file_beside, folder_to_write, refuse_result, run_and_save
-from strapdown.cli.shared_options import (
-    LogFlags,
-    ReportFlags,
-    as_flag,
-    folder_to_make,
-    log_keys,
-    running,
-    spread,
-    writing,
-)
 from strapdown.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -32,32 +23,32 @@ EPILOG = (
 MOST = 4  # findings on the terminal
 
 
-@spread
+@options.spread
 def allan(
     logs: list[Path] = typer.Argument(
         metavar="LOG...",
         help="Log of an unmoved sensor, an hour or more; several logs of one sensor are "
         "fitted together.",
     ),
-    program: str | None = running(
+    program: str | None = options.running(
         "PROGRAM",
         "Print the noise as the parameters of another program, too: KF-GINS, OB_GINS, GTSAM, "
         "kalibr, ORB-SLAM3, robot_localization, PX4, NaveGo, PSINS, data-sheet.",
         "--for",
     ),
-    at_rest: bool = running(
+    at_rest: bool = options.running(
         None,
         "Use the whole log, or its part, as stationary, without a test.",
         "--at-rest",
         default=False,
     ),
-    sensor_file: Path | None = writing(
+    sensor_file: Path | None = options.writing(
         "FILE.toml", "Write the sensor here, for --sensor of navigate and align."
     ),
     *,
-    flags: LogFlags,
-    out: Path | None = folder_to_make("LOG-allan"),
-    write: ReportFlags,
+    flags: options.LogFlags,
+    out: Path | None = options.folder_to_make("LOG-allan"),
+    write: options.ReportFlags,
 ) -> None:
     """Find the noise of a sensor from a log at rest: Allan deviation, noise terms, sensor file.
 
@@ -72,14 +63,14 @@ def allan(
     beside = file_beside(
         sensor_file, "--sensor-file", write.force, lambda run: str(run.sensor_text())
     )
-    keys = {key: value for key, value in log_keys(flags.given()).items() if value}
+    keys = {key: value for key, value in options.log_keys(flags.given()).items() if value}
 
     def compute(report: Progress) -> AllanRun:
         try:
             keys.update(axes=flags.axes, at_rest=at_rest, target=program)
             return analyse(*map(str, logs), progress=report, **keys)
         except ConfigError as error:
-            raise as_flag(error, {"target": "--for"}) from None
+            raise options.as_flag(error, {"target": "--for"}) from None
 
     def show(result: AllanRun) -> None:
         print_noise(result, sensor_file)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from strapdown.cli import shared_options as options
 from strapdown.cli.console import (
     WORDS,
     Stopwatch,
@@ -18,16 +19,6 @@ from strapdown.cli.console import (
     progress,
 )
 from strapdown.cli.result_folder import claim, folder_to_write, refuse_result
-from strapdown.cli.shared_options import (
-    RECOVER,
-    TOKEN,
-    ReportFlags,
-    folder_to_make,
-    missing_argument,
-    running,
-    spread,
-    writing,
-)
 from strapdown.errors import printable
 
 if TYPE_CHECKING:
@@ -43,27 +34,29 @@ EPILOG = (
 class LiveFlags:
     """Detection while samples arrive, and on a microcontroller."""
 
-    live: str | None = running(
+    live: str | None = options.running(
         "-|udp://HOST:PORT",
         "Detect a crash in samples as they come, as lines of standard input or of datagrams, "
         "by the recorder of the case.",
     )
-    every: float | None = running("S", "With --live: an estimate of an event so often (0.01).")
-    calibration: Path | None = running(
+    every: float | None = options.running(
+        "S", "With --live: an estimate of an event so often (0.01)."
+    )
+    calibration: Path | None = options.running(
         "RESULT",
         "With --live or --export: a result of strapdown crash in which the drive determined "
         "biases, scale factors and mounting of the recorder; they are taken off.",
     )
-    token: str | None = TOKEN
-    recover: Path | None = RECOVER
-    export: Path | None = writing(
+    token: str | None = options.TOKEN
+    recover: Path | None = options.RECOVER
+    export: Path | None = options.writing(
         "FILE.c",
         "Write the detection of --live for the recorder of the case as C99, with a test "
         "vector, and nothing else.",
     )
 
 
-@spread
+@options.spread
 def crash(
     cases: list[Path] | None = typer.Argument(
         None,
@@ -73,8 +66,8 @@ def crash(
     ),
     *,
     flags: LiveFlags,
-    out: Path | None = folder_to_make("CASE-crash, with --live CASE-crash-live"),
-    write: ReportFlags,
+    out: Path | None = options.folder_to_make("CASE-crash, with --live CASE-crash-live"),
+    write: options.ReportFlags,
 ) -> None:
     """Reconstruct a crash: delta-V, direction of force, severity and path, each with its bound.
 
@@ -92,7 +85,7 @@ def crash(
         recover_crash(cases or None, out, write, flags)
         return
     if not cases:
-        raise missing_argument("CASE.toml...")
+        raise options.missing_argument("CASE.toml...")
     if any(one is not None for one in asdict(flags).values()):
         from strapdown.cli.crash_live import crash_live
 

@@ -11,21 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from strapdown.cli import shared_options as options
 from strapdown.cli.console import console, print_findings, progress
 from strapdown.cli.result_folder import refuse_result
-from strapdown.cli.shared_options import (
-    QUIET,
-    SENSOR,
-    VERBOSE,
-    FixFlags,
-    LogFlags,
-    fix_keys,
-    log_keys,
-    running,
-    spread,
-    with_what,
-    writing,
-)
 from strapdown.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -51,10 +39,10 @@ app = typer.Typer(
 
 
 def _file_to_write(name: str, default: Path | None = None) -> Any:
-    return writing("FILE", f"File to write ({name}).", default=default)
+    return options.writing("FILE", f"File to write ({name}).", default=default)
 
 
-FORCE = writing(None, "Overwrite an existing file.", "--force", default=False)
+FORCE = options.writing(None, "Overwrite an existing file.", "--force", default=False)
 
 
 @app.callback(epilog=EPILOG)
@@ -72,8 +60,8 @@ def crash(
     ),
     out: Path = _file_to_write("case.toml", default=Path("case.toml")),
     force: bool = FORCE,
-    quiet: bool = QUIET,
-    verbose: bool = VERBOSE,
+    quiet: bool = options.QUIET,
+    verbose: bool = options.VERBOSE,
 ) -> None:
     """Propose the case file of a crash from its records, with questions for missing data.
 
@@ -92,17 +80,17 @@ def crash(
 
 
 @app.command("align", epilog=ALIGN_EPILOG)
-@spread
+@options.spread
 def align(
     log: Path = typer.Argument(
         metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
     ),
     *,
-    flags: LogFlags,
+    flags: options.LogFlags,
     out: Path = _file_to_write("align.toml", default=Path("align.toml")),
     force: bool = FORCE,
-    quiet: bool = QUIET,
-    verbose: bool = VERBOSE,
+    quiet: bool = options.QUIET,
+    verbose: bool = options.VERBOSE,
 ) -> None:
     """Propose the configuration of an alignment from a log, with questions for missing data.
 
@@ -117,7 +105,7 @@ def align(
 
 
 @app.command("navigate", epilog=NAVIGATE_EPILOG)
-@spread
+@options.spread
 def navigate(
     log: Path = typer.Argument(
         metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
@@ -125,20 +113,20 @@ def navigate(
     beside: Path | None = typer.Argument(
         None, metavar="[FIXES]", help="As --gnss.", show_default=False
     ),
-    gnss: Path | None = with_what("FIXES", "Fixes of a satellite receiver."),
-    sensor: str | None = with_what(
-        "NAME|FILE", f"{SENSOR[:-1]}; the nearest by noise, if not given."
+    gnss: Path | None = options.with_what("FIXES", "Fixes of a satellite receiver."),
+    sensor: str | None = options.with_what(
+        "NAME|FILE", f"{options.SENSOR[:-1]}; the nearest by noise, if not given."
     ),
-    foot: bool = running(
+    foot: bool = options.running(
         None, "Foot-mounted unit: zero velocity at each stance.", "--foot", default=False
     ),
     *,
-    flags: LogFlags,
-    fixes: FixFlags,
+    flags: options.LogFlags,
+    fixes: options.FixFlags,
     out: Path = _file_to_write("navigate.toml", default=Path("navigate.toml")),
     force: bool = FORCE,
-    quiet: bool = QUIET,
-    verbose: bool = VERBOSE,
+    quiet: bool = options.QUIET,
+    verbose: bool = options.VERBOSE,
 ) -> None:
     """Propose the configuration of a navigation run from log and fixes.
 
@@ -152,7 +140,7 @@ def navigate(
         raise ConfigError("cli.fixes-twice", quantity="--gnss", files=[str(gnss), str(beside)])
 
     def draft(folder: Path, report: Progress) -> Any:
-        keys = fix_keys(fixes.given(), gnss or beside)
+        keys = options.fix_keys(fixes.given(), gnss or beside)
         receiver = specify(FixesTable, **{"path": str(log), **keys}) if keys else None
         proposed = draft_navigation(
             _table(log, flags),
@@ -169,11 +157,11 @@ def navigate(
     _propose("navigate", [log], draft, question, out, force=force, quiet=quiet)
 
 
-def _table(log: Path, flags: LogFlags) -> LogTable:
+def _table(log: Path, flags: options.LogFlags) -> LogTable:
     from strapdown.config.logs import LogTable
     from strapdown.config.spec import specify
 
-    return specify(LogTable, path=str(log), **log_keys(flags.given()))
+    return specify(LogTable, path=str(log), **options.log_keys(flags.given()))
 
 
 def _propose(
