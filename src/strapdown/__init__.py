@@ -29,164 +29,98 @@ from typing import TYPE_CHECKING
 from strapdown.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from strapdown.alignment.alignment import Site
-    from strapdown.alignment.fine import FineAlignment
-    from strapdown.api.alignment import AlignmentRun, OutageRun, align, outage
-    from strapdown.api.allan import AllanRun, allan, compare_sensors, list_sensors
-    from strapdown.api.attitude import (
-        Attitude,
-        AttitudeComparison,
-        AttitudeOptions,
-        MagnetometerCalibration,
-        OrientationFilter,
-        attitude,
-        calibrate_magnetometer,
-        compare_attitude,
-    )
-    from strapdown.api.calibrate import CalibrateRun, calibrate
-    from strapdown.api.compare import RunComparison, compare_runs
-    from strapdown.api.crash import CrashRun, reconstruct
-    from strapdown.api.doctor import Diagnosis, doctor
-    from strapdown.api.extrinsics import ExtrinsicsRun, extrinsics
-    from strapdown.api.navigation import (
-        Barometer,
-        BodyVelocity,
-        Gnss,
-        Heading,
-        Magnetometer,
-        Measurement,
-        NavigationRun,
-        NonHolonomic,
-        Odometer,
-        ZeroAngularRate,
-        ZeroVelocity,
-        navigate,
-    )
-    from strapdown.api.reading import GnssFixes, Imu, Streams, read, read_gnss, read_imu
-    from strapdown.api.simulation import Simulation, simulate
-    from strapdown.api.writing import write
-    from strapdown.bundle.signature import sign
-    from strapdown.campaign.engine import Workers
-    from strapdown.campaign.run import CampaignRun, run_campaign
-    from strapdown.crash.entry import Entry
-    from strapdown.crash.path import sample_paths
-    from strapdown.crash.reconstruction import (
-        CrashOptions,
-        CrashReconstruction,
-        reconstruct_crash,
-    )
-    from strapdown.earth import magnetic_field
-    from strapdown.errors import ConfigError, DataError, DivergenceError, StrapdownError
+    from strapdown.alignment.alignment import Site as Site
+    from strapdown.alignment.fine import FineAlignment as FineAlignment
+    from strapdown.api.alignment import AlignmentRun as AlignmentRun
+    from strapdown.api.alignment import OutageRun as OutageRun
+    from strapdown.api.alignment import align as align
+    from strapdown.api.alignment import outage as outage
+    from strapdown.api.allan import AllanRun as AllanRun
+    from strapdown.api.allan import allan as allan
+    from strapdown.api.allan import compare_sensors as compare_sensors
+    from strapdown.api.allan import list_sensors as list_sensors
+    from strapdown.api.attitude import Attitude as Attitude
+    from strapdown.api.attitude import AttitudeComparison as AttitudeComparison
+    from strapdown.api.attitude import AttitudeOptions as AttitudeOptions
+    from strapdown.api.attitude import MagnetometerCalibration as MagnetometerCalibration
+    from strapdown.api.attitude import OrientationFilter as OrientationFilter
+    from strapdown.api.attitude import attitude as attitude
+    from strapdown.api.attitude import calibrate_magnetometer as calibrate_magnetometer
+    from strapdown.api.attitude import compare_attitude as compare_attitude
+    from strapdown.api.calibrate import CalibrateRun as CalibrateRun
+    from strapdown.api.calibrate import calibrate as calibrate
+    from strapdown.api.compare import RunComparison as RunComparison
+    from strapdown.api.compare import compare_runs as compare_runs
+    from strapdown.api.crash import CrashRun as CrashRun
+    from strapdown.api.crash import reconstruct as reconstruct
+    from strapdown.api.doctor import Diagnosis as Diagnosis
+    from strapdown.api.doctor import doctor as doctor
+    from strapdown.api.extrinsics import ExtrinsicsRun as ExtrinsicsRun
+    from strapdown.api.extrinsics import extrinsics as extrinsics
+    from strapdown.api.navigation import Barometer as Barometer
+    from strapdown.api.navigation import BodyVelocity as BodyVelocity
+    from strapdown.api.navigation import Gnss as Gnss
+    from strapdown.api.navigation import Heading as Heading
+    from strapdown.api.navigation import Magnetometer as Magnetometer
+    from strapdown.api.navigation import Measurement as Measurement
+    from strapdown.api.navigation import NavigationRun as NavigationRun
+    from strapdown.api.navigation import NonHolonomic as NonHolonomic
+    from strapdown.api.navigation import Odometer as Odometer
+    from strapdown.api.navigation import ZeroAngularRate as ZeroAngularRate
+    from strapdown.api.navigation import ZeroVelocity as ZeroVelocity
+    from strapdown.api.navigation import navigate as navigate
+    from strapdown.api.reading import GnssFixes as GnssFixes
+    from strapdown.api.reading import Imu as Imu
+    from strapdown.api.reading import Streams as Streams
+    from strapdown.api.reading import read as read
+    from strapdown.api.reading import read_gnss as read_gnss
+    from strapdown.api.reading import read_imu as read_imu
+    from strapdown.api.simulation import Simulation as Simulation
+    from strapdown.api.simulation import simulate as simulate
+    from strapdown.api.writing import write as write
+    from strapdown.bundle.signature import sign as sign
+    from strapdown.campaign.engine import Workers as Workers
+    from strapdown.campaign.run import CampaignRun as CampaignRun
+    from strapdown.campaign.run import run_campaign as run_campaign
+    from strapdown.crash.entry import Entry as Entry
+    from strapdown.crash.path import sample_paths as sample_paths
+    from strapdown.crash.reconstruction import CrashOptions as CrashOptions
+    from strapdown.crash.reconstruction import CrashReconstruction as CrashReconstruction
+    from strapdown.crash.reconstruction import reconstruct_crash as reconstruct_crash
+    from strapdown.earth import magnetic_field as magnetic_field
+    from strapdown.errors import ConfigError as ConfigError
+    from strapdown.errors import DataError as DataError
+    from strapdown.errors import DivergenceError as DivergenceError
+    from strapdown.errors import StrapdownError as StrapdownError
     from strapdown.evaluation.trajectory_differences import (
-        summarise_differences,
-        trajectory_differences,
+        summarise_differences as summarise_differences,
     )
-    from strapdown.formats import read_log
-    from strapdown.formats.crash_records import read_crash_record
-    from strapdown.formats.nhtsa import read_nhtsa
-    from strapdown.formats.trajectory_readers import read_trajectory
-    from strapdown.formats.writers import write_trajectory
-    from strapdown.increments import motion_increments
-    from strapdown.mechanization import NavTracker, NorthEastDown, WanderAzimuth, run_mechanization
-    from strapdown.nav_state import NavState
-    from strapdown.report.sensors import SensorsRun
-    from strapdown.report.verify import verify
-    from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
-    from strapdown.sensors.imu_health import check_imu_channels
-    from strapdown.sensors.redundant_units import vote_units
-    from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
+    from strapdown.evaluation.trajectory_differences import (
+        trajectory_differences as trajectory_differences,
+    )
+    from strapdown.formats import read_log as read_log
+    from strapdown.formats.crash_records import read_crash_record as read_crash_record
+    from strapdown.formats.nhtsa import read_nhtsa as read_nhtsa
+    from strapdown.formats.trajectory_readers import read_trajectory as read_trajectory
+    from strapdown.formats.writers import write_trajectory as write_trajectory
+    from strapdown.increments import motion_increments as motion_increments
+    from strapdown.mechanization import NavTracker as NavTracker
+    from strapdown.mechanization import NorthEastDown as NorthEastDown
+    from strapdown.mechanization import WanderAzimuth as WanderAzimuth
+    from strapdown.mechanization import run_mechanization as run_mechanization
+    from strapdown.nav_state import NavState as NavState
+    from strapdown.report.sensors import SensorsRun as SensorsRun
+    from strapdown.report.verify import verify as verify
+    from strapdown.sensors.crash_unit import Assumed as Assumed
+    from strapdown.sensors.crash_unit import CrashUnit as CrashUnit
+    from strapdown.sensors.crash_unit import Mounting as Mounting
+    from strapdown.sensors.crash_unit import RecordedTriad as RecordedTriad
+    from strapdown.sensors.imu_health import check_imu_channels as check_imu_channels
+    from strapdown.sensors.redundant_units import vote_units as vote_units
+    from strapdown.sensors.uncertainty import ImuUncertainty as ImuUncertainty
+    from strapdown.sensors.uncertainty import TriadUncertainty as TriadUncertainty
 
 __version__ = "0.2.0.dev0"
-
-__all__ = [
-    "AlignmentRun",
-    "AllanRun",
-    "Assumed",
-    "Attitude",
-    "AttitudeComparison",
-    "AttitudeOptions",
-    "Barometer",
-    "BodyVelocity",
-    "CalibrateRun",
-    "CampaignRun",
-    "ConfigError",
-    "CrashOptions",
-    "CrashReconstruction",
-    "CrashRun",
-    "CrashUnit",
-    "DataError",
-    "Diagnosis",
-    "DivergenceError",
-    "Entry",
-    "ExtrinsicsRun",
-    "FineAlignment",
-    "Gnss",
-    "GnssFixes",
-    "Heading",
-    "Imu",
-    "ImuUncertainty",
-    "Magnetometer",
-    "MagnetometerCalibration",
-    "Measurement",
-    "Mounting",
-    "NavState",
-    "NavTracker",
-    "NavigationRun",
-    "NonHolonomic",
-    "NorthEastDown",
-    "Odometer",
-    "OrientationFilter",
-    "OutageRun",
-    "RecordedTriad",
-    "RunComparison",
-    "SensorsRun",
-    "Simulation",
-    "Site",
-    "StrapdownError",
-    "Streams",
-    "TriadUncertainty",
-    "WanderAzimuth",
-    "Workers",
-    "ZeroAngularRate",
-    "ZeroVelocity",
-    "__version__",
-    "align",
-    "allan",
-    "attitude",
-    "calibrate",
-    "calibrate_magnetometer",
-    "check_imu_channels",
-    "compare_attitude",
-    "compare_runs",
-    "compare_sensors",
-    "doctor",
-    "extrinsics",
-    "list_sensors",
-    "magnetic_field",
-    "motion_increments",
-    "navigate",
-    "outage",
-    "read",
-    "read_crash_record",
-    "read_gnss",
-    "read_imu",
-    "read_log",
-    "read_nhtsa",
-    "read_trajectory",
-    "reconstruct",
-    "reconstruct_crash",
-    "run_campaign",
-    "run_mechanization",
-    "sample_paths",
-    "sign",
-    "simulate",
-    "summarise_differences",
-    "trajectory_differences",
-    "verify",
-    "vote_units",
-    "write",
-    "write_trajectory",
-]
 
 # numba alone takes longer to import than most commands take to run.
 load_on_first_use(

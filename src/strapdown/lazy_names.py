@@ -13,13 +13,15 @@ def load_on_first_use(package: str, homes: Mapping[str, str]) -> None:
     """Let a package export names of its modules without importing these.
 
     `package`: ``__name__`` of the package that calls this. `homes`: module within the package, and
-    the names that it gives, separated by spaces; they are its ``__all__``, if it states none.
+    the names that it gives, separated by spaces; they are its ``__all__``, if it states none, with
+    its version, if it states that.
     """
     module = sys.modules[package]
     module.__dict__["_homes"] = {
         name: home for home, names in homes.items() for name in names.split()
     }
-    module.__dict__.setdefault("__all__", sorted(module.__dict__["_homes"]))
+    given = {*module.__dict__["_homes"], *({"__version__"} & module.__dict__.keys())}
+    module.__dict__.setdefault("__all__", sorted(given))
     module.__class__ = _Lazy
 
 

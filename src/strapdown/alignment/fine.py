@@ -12,19 +12,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown.alignment import stationary
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.record_checks import seems_in_deg_per_s
-from strapdown.alignment.stationary import (
-    OBSERVATIONS,
-    Standing,
-    attitude_of_rest,
-    home_of,
-    measured_standing,
-    rate_observation,
-    still_observations,
-    velocity_of_noise,
-    without_steady_turn,
-)
 from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
 from strapdown.estimation.covariance import (
@@ -46,7 +36,7 @@ from strapdown.tables import ACCEL, EULER, GYRO, MOTION
 from strapdown.tables.checks import Array, is_number, source_of, values_of
 
 # Motion of a body on a floor in a town; a smaller one is not assumed.
-LEAST = Standing(
+LEAST = stationary.Standing(
     position=np.full(3, 1e-3),  # m
     velocity=np.full(3, 3e-4),  # m/s
     turn=np.zeros(3),  # rad
@@ -91,21 +81,21 @@ class FineAlignment:
     form: CovarianceForm = field(default_factory=COVARIANCES["ud"])
     rule: UpdateRule | None = None
     interval: float = 1.0
-    observe: tuple[str, ...] = OBSERVATIONS
-    standing: Standing | None = None
+    observe: tuple[str, ...] = stationary.OBSERVATIONS
+    standing: stationary.Standing | None = None
 
     def __post_init__(self) -> None:
         if not is_number(self.interval) or not 0.0 < self.interval <= 60.0:
             raise ConfigError(
                 "alignment.interval-out-of-range", quantity="interval", interval=self.interval
             )
-        unknown = [name for name in self.observe if name not in OBSERVATIONS]
+        unknown = [name for name in self.observe if name not in stationary.OBSERVATIONS]
         if unknown or "velocity" not in self.observe:
             raise ConfigError(
                 "alignment.unknown-rest-observation",
                 quantity="observe",
                 observe=", ".join(self.observe) or "nothing",
-                observations=OBSERVATIONS,
+                observations=stationary.OBSERVATIONS,
             )
         if self.mechanization.height == "damped":
             raise ConfigError("alignment.height-damped", quantity="height")
@@ -188,12 +178,14 @@ class FineAlignment:
             )
         state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
         earth = rotation.rotate(rotation.conjugate(start.q_nb), site.earth_rate)
-        steady = without_steady_turn(rows, earth)
+        steady = stationary.without_steady_turn(rows, earth)
         whole = _free_run(filter_, state, time, steady, source_of(imu))
-        home = replace(home_of(site, begin), q_nb=attitude_of_rest(whole))
+        home = replace(stationary.home_of(site, begin), q_nb=stationary.attitude_of_rest(whole))
         standing = self.standing
         if standing is None:
-            standing = measured_standing(whole, home, int(ends[0]), LEAST, filter_.model.gyro_noise)
+            standing = stationary.measured_standing(
+                whole, home, int(ends[0]), LEAST, filter_.model.gyro_noise
+            )
         state = filter_.begin(start, initial_covariance(filter_, coarse, standing))
         epochs = AlignmentEpochs(filter_)
         epochs.add(state, {})
@@ -229,7 +221,7 @@ class FineAlignment:
         """The state at the first sample; an attitude at the last one is propagated back."""
         end = float(increments.index[-1])
         slack = float(increments["dt"].max())
-        home = replace(home_of(site, coarse.time), q_nb=coarse.q_nb)
+        home = replace(stationary.home_of(site, coarse.time), q_nb=coarse.q_nb)
         if abs(coarse.time - begin) <= slack:
             return replace(home, time=begin)
         if abs(coarse.time - end) <= slack:
@@ -337,7 +329,7 @@ def settled_epoch(
     time: Array,
     rows: Array,
     home: NavState,
-    standing: Standing,
+    standing: stationary.Standing,
     observe: tuple[str, ...],
 ) -> tuple[FilterState, Seen]:
     """Propagate over one epoch of a rest and update with its observations at the end."""
@@ -346,14 +338,14 @@ def settled_epoch(
         made: list[Observation] = []
 
         def turn(segment: Segment) -> Observation:
-            made.append(rate_observation(filter_, segment, home, standing))
+            made.append(stationary.rate_observation(filter_, segment, home, standing))
             return made[0]
 
         state, _, innovations = filter_.predict_observing(state, time, rows, turn)
         seen["rate"] = (made[0], innovations)
     else:
         state, _ = filter_.predict(state, time, rows)
-    others = still_observations(filter_, state, home, standing, observe)
+    others = stationary.still_observations(filter_, state, home, standing, observe)
     state, _, several = filter_.observe(state, others)
     seen |= {one.name: (one, of) for one, of in zip(others, several, strict=True)}
     return state, seen
@@ -375,7 +367,9 @@ def prior_heading_sd(coarse: Alignment) -> float:
     return min(max(WIDER * heading, LEAST_HEADING), MOST_HEADING)
 
 
-def initial_covariance(filter_: ErrorFilter, coarse: Alignment, standing: Standing) -> Array:
+def initial_covariance(
+    filter_: ErrorFilter, coarse: Alignment, standing: stationary.Standing
+) -> Array:
     """Covariance of the physical errors before the first epoch, in north-east-down."""
     P = np.zeros((filter_.model.physical_size,) * 2)
     P[0:3, 0:3] = np.diag(standing.position**2)
@@ -528,7 +522,7 @@ def _stands(result: FineResult) -> Iterator[Finding]:
     velocity = float(result.standing.velocity.max())
     turn = float(np.degrees(result.standing.turn.max()))
     model = result.filter.model
-    noise = velocity_of_noise(
+    noise = stationary.velocity_of_noise(
         model.gyro_noise, model.accel_noise, result.interval, len(result.history) - 1
     )
     moves = velocity > max(MOST_VELOCITY, OVER_NOISE * noise)
@@ -636,7 +630,7 @@ class FineResult:
     at_start: Alignment
     history: pd.DataFrame
     innovations: Mapping[str, pd.DataFrame]
-    standing: Standing
+    standing: stationary.Standing
     interval: float
     heading_given: bool
     prior_heading_sd_deg: float

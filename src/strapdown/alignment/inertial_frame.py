@@ -9,20 +9,10 @@ import numpy as np
 import pandas as pd
 
 from strapdown import rotation
+from strapdown.alignment import record_checks as checks
 from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
 from strapdown.alignment.inertial_sums import InertialSums, moments, sum_inertially
 from strapdown.alignment.mean_errors import CHANCE, mean_of_drift, sensor_covariance, sensor_noise
-from strapdown.alignment.record_checks import (
-    CONTRADICTION,
-    LARGEST_SD,
-    check_gravity,
-    check_record,
-    gravity_findings,
-    latitude_findings,
-    north_findings,
-    seems_in_deg_per_s,
-    still_by_gnss,
-)
 from strapdown.constants import DEG_PER_HOUR
 from strapdown.dsp.chi_square import chi_square_exceeded
 from strapdown.earth import earth_rate
@@ -74,13 +64,13 @@ class InertialFrame(CoarseAlignment):
         standard deviation of the heading exceeds 1 rad.
         """
         source = source_of(imu)
-        findings = [*check_record(imu)]
+        findings = [*checks.check_record(imu)]
         sums = sum_inertially(imu)
-        findings += check_gravity(sums.node_velocity.sum(axis=0) / sums.length, source)
+        findings += checks.check_gravity(sums.node_velocity.sum(axis=0) / sums.length, source)
         fit = fit_inertially(sums, site)
         noise = residual_noise(sums, fit, sensors)
         own = _own_covariance(sums, fit, sensors)
-        findings += north_findings(site, float(np.sqrt(own[2, 2])), sensors, source)
+        findings += checks.north_findings(site, float(np.sqrt(own[2, 2])), sensors, source)
         whole = own + noise.covariance(sums, fit.response.push, fit.response.place)
         sd = np.sqrt(np.maximum(np.diagonal(whole), 0.0))
         _refuse_travel(noise, sd, imu, site, findings)
@@ -95,12 +85,12 @@ class InertialFrame(CoarseAlignment):
                 sway=noise.sway,
                 sd_deg=np.degrees(sd[2]),
             )
-        findings += still_by_gnss(gnss, imu, site, float(sd[2]))
+        findings += checks.still_by_gnss(gnss, imu, site, float(sd[2]))
         findings += turn_findings(sums, fit.C_nb, site, sensors, source)
-        findings += gravity_findings(fit.gravity_change, float(sd[4]), source)
+        findings += checks.gravity_findings(fit.gravity_change, float(sd[4]), source)
         measured = site.lat_deg + float(np.degrees(fit.latitude_change))
         measured_sd = float(np.degrees(sd[3]))
-        findings += latitude_findings(site, measured, measured_sd, source)
+        findings += checks.latitude_findings(site, measured, measured_sd, source)
         C_nb, covariance = fit.C_nb, whole[:3, :3]
         if self.at == "end":
             level = rotation.dcm_from_rotation_vector(-site.earth_rate * sums.length)
@@ -140,7 +130,7 @@ def _refuse_travel(
     noise: ResidualNoise, sd: Array, imu: pd.DataFrame, site: Site, findings: list[Finding]
 ) -> None:
     """Refuse a record whose residuals are too large to find north."""
-    if not (noise.significant and sd[2] > LARGEST_SD):
+    if not (noise.significant and sd[2] > checks.LARGEST_SD):
         return
     rate = imu[GYRO].to_numpy(dtype=np.float64).mean(axis=0)
     length = float(imu.index[-1] - imu.index[0])
@@ -150,7 +140,7 @@ def _refuse_travel(
         raise DataError(known[0].explains("alignment.heading-lost", sd_deg=np.degrees(sd[2])))
     raise DataError(
         "alignment.body-travelled-or-gyros-in-deg-per-s"
-        if seems_in_deg_per_s(rate, site)
+        if checks.seems_in_deg_per_s(rate, site)
         else "alignment.body-travelled",
         file=source_of(imu),
         quantity="accel",
@@ -382,7 +372,7 @@ def turn_findings(
     inertial-frame alignment of a body that turned; it does if the body was stationary.
     """
     rate, sd = heading_rate(sums, C_nb, site, sensors)
-    if not abs(rate) > CONTRADICTION * sd:
+    if not abs(rate) > checks.CONTRADICTION * sd:
         return ()
     vertical = -float(site.earth_rate[2])
     size = float(np.sqrt(site.earth_rate @ site.earth_rate))

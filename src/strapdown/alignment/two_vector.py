@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown import rotation
+from strapdown.alignment import record_checks as checks
 from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
 from strapdown.alignment.mean_errors import (
     BlockMeans,
@@ -18,17 +19,6 @@ from strapdown.alignment.mean_errors import (
     gravity_change,
     of_mean,
     rate_covariance,
-)
-from strapdown.alignment.record_checks import (
-    CONTRADICTION,
-    LARGEST_SD,
-    check_gravity,
-    check_record,
-    gravity_findings,
-    latitude_findings,
-    north_findings,
-    seems_in_deg_per_s,
-    still_by_gnss,
 )
 from strapdown.constants import DEG_PER_HOUR
 from strapdown.errors import ConfigError, DataError, Finding
@@ -75,10 +65,10 @@ class TwoVector(CoarseAlignment):
         DataError: the record is unusable, its force is not gravity, its rate is not the Earth's, or
         the standard deviation of the heading exceeds 1 rad.
         """
-        findings = [*check_record(imu)]
+        findings = [*checks.check_record(imu)]
         source = source_of(imu)
         means = block_means(imu, self.blocks)
-        findings += check_gravity(means.whole_force, source)
+        findings += checks.check_gravity(means.whole_force, source)
         C_nb = triad_attitude(means.whole_force, means.whole_rate, site)
 
         rate = C_nb @ rate_covariance(sensors, means.length, means.whole_rate, means.whole_force)
@@ -98,15 +88,15 @@ class TwoVector(CoarseAlignment):
         if loud_rate > 1.0 or loud_force > 1.0:
             disturbed = _disturbed(means, site, loud_rate, loud_force, swing, source)
             findings.append(disturbed)
-            if heading_sd > LARGEST_SD:
+            if heading_sd > checks.LARGEST_SD:
                 sd_deg = np.degrees(heading_sd)
                 raise DataError(disturbed.explains("alignment.heading-lost", sd_deg=sd_deg))
-        findings += north_findings(site, heading_sd, sensors, source)
-        findings += still_by_gnss(gnss, imu, site, heading_sd)
+        findings += checks.north_findings(site, heading_sd, sensors, source)
+        findings += checks.still_by_gnss(gnss, imu, site, heading_sd)
         turned = C_nb @ means.whole_force
-        findings += gravity_findings(*gravity_change(turned, force, site.gravity), source)
+        findings += checks.gravity_findings(*gravity_change(turned, force, site.gravity), source)
         latitude, latitude_sd = _latitude(means, site, rate, force)
-        findings += latitude_findings(site, latitude, latitude_sd, source)
+        findings += checks.latitude_findings(site, latitude, latitude_sd, source)
         return Alignment(
             self.name,
             float(imu.index[-1]),
@@ -155,10 +145,10 @@ def _check_rate(
     """Compare the magnitude of the mean rate with the Earth's; refuse a turn, or another unit."""
     rate, earth = means.whole_rate, float(np.sqrt(site.earth_rate @ site.earth_rate))
     size, sd = float(np.sqrt(rate @ rate)), float(np.sqrt(np.trace(covariance)))
-    if not abs(size - earth) > CONTRADICTION * sd:
+    if not abs(size - earth) > checks.CONTRADICTION * sd:
         return ()
     bias = max(sensors.gyro.axis("bias")) * DEG_PER_HOUR
-    in_deg = seems_in_deg_per_s(rate, site)
+    in_deg = checks.seems_in_deg_per_s(rate, site)
     contradicts = Finding(
         "alignment.mean-rate-seems-in-deg-per-s"
         if in_deg
@@ -171,7 +161,7 @@ def _check_rate(
         earth=earth * DEG_PER_HOUR,
         bias=bias,
     )
-    if size > 2.0 * earth + CONTRADICTION * sd:
+    if size > 2.0 * earth + checks.CONTRADICTION * sd:
         raise DataError(contradicts)
     return (contradicts,)
 

@@ -33,7 +33,8 @@ from strapdown.formats.clocks import CLOCK
 from strapdown.formats.gnss_files import read_gnss as read_gnss_table
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import ABSENT as ABSENT
-from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
+from strapdown.formats.trajectory_readers import read_trajectory
+from strapdown.tables import ACCEL, GYRO, QUATERNION, attitude_table, imu_table
 from strapdown.tables.checks import view_of
 
 if TYPE_CHECKING:
@@ -430,9 +431,6 @@ def read(path: str | Path, **options: Any) -> Streams:
     DataError, ConfigError
         The recording has neither a log of an inertial sensor nor fixes.
     """
-    from strapdown.formats.trajectory_readers import read_trajectory
-    from strapdown.tables import attitude_table
-
     _require_path(path)
 
     def fixes(path: str | Path) -> pd.DataFrame:

@@ -25,16 +25,7 @@ from strapdown.errors import (
     add_warning,
     check_choice,
 )
-from strapdown.formats import STREAMS, open_stream
-from strapdown.formats.clocks import (
-    CLOCK,
-    RELATIVE,
-    Clock,
-    clock_of,
-    own_ns,
-    read_stamps,
-    with_clock,
-)
+from strapdown.formats import STREAMS, clocks, open_stream
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.recording import ABSENT, NoStreamError, RawLog
@@ -164,7 +155,7 @@ def read_streams(
     if "reference" not in tables and "imu" in tables and "reference" in tables["imu"].attrs:
         q_nb, stamps = tables["imu"].attrs["reference"]
         truth = attitude_table(stamps, q_nb, tables["imu"].attrs.get("source"))
-        truth.attrs |= {k: v for k, v in tables["imu"].attrs.items() if k in CLOCK}
+        truth.attrs |= {k: v for k, v in tables["imu"].attrs.items() if k in clocks.CLOCK}
         tables["reference"] = truth
     if not tables:
         raise absent[0] if absent else DataError("io.no-stream-at-all", file=str(paths[0]))
@@ -217,9 +208,11 @@ def _on_clock_of_run(trajectory: pd.DataFrame, path: Path) -> pd.DataFrame:
     if path.stem != "trajectory" or not run.is_file():
         return trajectory
     clock = json.loads(run.read_text(encoding="utf-8"))["record"].get("clock")
-    if clock is None or clock_of(trajectory).name != RELATIVE:
+    if clock is None or clocks.clock_of(trajectory).name != clocks.RELATIVE:
         return trajectory
-    return with_clock(trajectory, Clock(clock["name"], clock["origin_s"], clock["gps_week"]))
+    return clocks.with_clock(
+        trajectory, clocks.Clock(clock["name"], clock["origin_s"], clock["gps_week"])
+    )
 
 
 #: Quantities of the streams beside samples and fixes: their columns, units, and that of the table.
@@ -254,7 +247,7 @@ def _beside(path: Path, stream: str, form: str | None, axes: str | None) -> pd.D
     rows = np.flatnonzero(usable)
     if not rows.size:
         raise DataError("io.no-usable-row", file=path.name)
-    stamps = read_stamps(
+    stamps = clocks.read_stamps(
         ticks[rows],
         ticks_unit,
         "stated by the file",
@@ -268,7 +261,7 @@ def _beside(path: Path, stream: str, form: str | None, axes: str | None) -> pd.D
     table.attrs |= {"source": path.name, "findings": (*raw.findings, *stamps.findings)}
     table.attrs["clock_origin_stamp"] = (origin.stamp, origin.unit)
     first = float(origin.stamp) * factor_of(origin.unit, TIME_UNITS)
-    return with_clock(table, Clock(raw.clock or RELATIVE, first))
+    return clocks.with_clock(table, clocks.Clock(raw.clock or clocks.RELATIVE, first))
 
 
 def _cut(
@@ -286,8 +279,8 @@ def _cut(
             last = time[-1] if part[1] is None else part[1]
             last = last if part[2] is None else first + part[2]
             keep = (time >= first) & (time <= last)
-        elif clock_of(table).name == clock_of(imu).name:
-            ns, ends = own_ns(table), own_ns(imu)
+        elif clocks.clock_of(table).name == clocks.clock_of(imu).name:
+            ns, ends = clocks.own_ns(table), clocks.own_ns(imu)
             keep = (ns >= ends[0]) & (ns <= ends[-1])
         else:
             add_warning(findings, "io.stream-not-cut", quantity=name, stream=name)

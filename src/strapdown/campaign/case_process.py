@@ -21,7 +21,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import IO, Any
 
-from strapdown.errors import ConfigError, StrapdownError
+from strapdown.errors import ConfigError, DivergenceError, StrapdownError
 
 #: Outcome of a case: status, code, findings, scalars in order, curves in order.
 Row = dict[str, Any]
@@ -44,7 +44,6 @@ def run_case(
     """
     from strapdown.campaign.kinds import KINDS, at_path
     from strapdown.campaign.specification import key_path
-    from strapdown.errors import DivergenceError
 
     case = campaign.case(number)
     kind = KINDS[campaign.spec.base.kind]

@@ -22,15 +22,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from strapdown.bundle import (
-    InputFiles,
-    Seal,
-    read_manifest,
-    resolved,
-    source_digest,
-    to_json,
-    write_json,
-)
+from strapdown import bundle
 from strapdown.bundle.atomic_folder import flush_entry
 from strapdown.campaign.case_process import run_case
 from strapdown.campaign.design import Campaign
@@ -128,7 +120,7 @@ class Dataset:
         (folder / CASES).mkdir(parents=True, exist_ok=True)
         if frozen["keep"].get("curves"):
             (folder / CURVES).mkdir(exist_ok=True)
-        _written(folder / CAMPAIGN, lambda path: path.write_text(to_json(frozen), "utf-8"))
+        _written(folder / CAMPAIGN, lambda path: path.write_text(bundle.to_json(frozen), "utf-8"))
         return cls(folder, frozen)
 
     def check(self, frozen: Mapping[str, Any]) -> None:
@@ -467,7 +459,7 @@ class CampaignRun:
 
     design: Campaign
     summary: dict[str, Any]
-    inputs: tuple[InputFiles, ...]
+    inputs: tuple[bundle.InputFiles, ...]
     dataset: Dataset = field(repr=False)
     stopped: Mapping[int, int] = field(default_factory=dict)
 
@@ -490,7 +482,7 @@ class CampaignRun:
         report: bool = True,
         force: bool = False,
         progress: Progress = silent,
-    ) -> Seal:
+    ) -> bundle.Seal:
         """Write the campaign as a sealed bundle, which `verify` runs again.
 
         Parameters
@@ -570,7 +562,7 @@ def _temporary() -> Path:
 def _with_digests(design: Campaign) -> dict[str, Any]:
     """The frozen campaign of a working folder, with what its results depend on besides."""
     digests = [digest for one in design.inputs for digest in one.digests]
-    return {**design.frozen(), "digests": digests, "source": source_digest()}
+    return {**design.frozen(), "digests": digests, "source": bundle.source_digest()}
 
 
 def resume(
@@ -719,9 +711,9 @@ def _run(configuration: dict[str, Any]) -> CampaignRun:
 def _write_files(
     run: CampaignRun, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
 ) -> None:
-    write_json(folder / CAMPAIGN, run.design.plain())
+    bundle.write_json(folder / CAMPAIGN, run.design.plain())
     run.dataset.write_blocks(folder, lambda table: _kept(table, run.stopped))
-    write_json(folder / "summary.json", run.summary)
+    bundle.write_json(folder / "summary.json", run.summary)
     if forms:
         from strapdown.campaign.page import campaign_document
         from strapdown.report.document_html import write_report
@@ -767,8 +759,8 @@ def open_campaign(folder: str | Path) -> Found:
     frozen = frozen_of(path)
     if "places" in frozen:
         return Found(Campaign.thawed(frozen), Dataset(path, frozen), False)
-    manifest = read_manifest(path)
-    configuration = resolved(manifest["configuration"], path)
+    manifest = bundle.read_manifest(path)
+    configuration = bundle.resolved(manifest["configuration"], path)
     design = Campaign.thawed(configuration["campaign"])
     return Found(design, Dataset(path, frozen), True)
 
@@ -835,9 +827,9 @@ def report_now(folder: str | Path, path: Path) -> None:
         path.write_bytes((Path(name) / "report.html").read_bytes())
 
 
-def save_case(design: Campaign, result: Any, out: Path, force: bool) -> Seal:
+def save_case(design: Campaign, result: Any, out: Path, force: bool) -> bundle.Seal:
     """Write the sealed folder of one case, with its report."""
-    seal: Seal = KINDS[design.spec.base.kind].save(result, out, force)
+    seal: bundle.Seal = KINDS[design.spec.base.kind].save(result, out, force)
     return seal
 
 

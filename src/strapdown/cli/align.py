@@ -5,29 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from strapdown.cli.shared_options import (
-    LOG_FLAGS,
-    FixFlags,
-    Height,
-    LogFlags,
-    Longitude,
-    ReportFlags,
-    Sensor,
-    as_flag,
-    fix_flags,
-    fix_keys,
-    folder_to_make,
-    log_keys,
-    module_of_flag,
-    refuse_beside_file,
-    running,
-    spread,
-    with_what,
-)
+from strapdown.cli import shared_options as options
+from strapdown.cli.console import WORDS, console, print_blocks, print_findings
+from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save, source_name
 from strapdown.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -46,34 +30,28 @@ MOST = 6  # findings on the terminal
 class AlignFlags:
     """Position, sensor and method of an alignment."""
 
-    lat: Annotated[float | None, with_what("DEG", "Latitude, north positive.")] = None
-    lon: Longitude = None
-    alt: Height = None
-    sensor: Sensor = None
-    method: Annotated[
-        str,
-        running(
-            "NAME",
-            "Coarse alignment, with options after a colon: inertial_frame (the body may "
-            "rock), two_vector, levelling, known_heading:heading_deg=90,sd_deg=1, gnss_course "
-            "(inertial_frame).",
-            show_default=False,
-        ),
-    ] = "inertial_frame"
-    coarse_only: Annotated[bool, running(None, "No fine alignment after it.", "--coarse-only")] = (
-        False
+    lat: float | None = options.with_what("DEG", "Latitude, north positive.")
+    lon: float | None = options.LONGITUDE
+    alt: float | None = options.HEIGHT
+    sensor: str | None = options.SENSOR_MODEL
+    method: str = options.running(
+        "NAME",
+        "Coarse alignment, with options after a colon: inertial_frame (the body may "
+        "rock), two_vector, levelling, known_heading:heading_deg=90,sd_deg=1, gnss_course "
+        "(inertial_frame).",
+        default="inertial_frame",
     )
-    gnss: Annotated[
-        Path | None, running("FIXES", "Fixes of a satellite receiver, for --method gnss_course.")
-    ] = None
-    prefilter: Annotated[
-        str,
-        running(
-            "NAME",
-            "Pre-filter of the samples, with options after a colon: robust_fir:rate_hz=100 (none).",
-            show_default=False,
-        ),
-    ] = "none"
+    coarse_only: bool = options.running(
+        None, "No fine alignment after it.", "--coarse-only", default=False
+    )
+    gnss: Path | None = options.running(
+        "FIXES", "Fixes of a satellite receiver, for --method gnss_course."
+    )
+    prefilter: str = options.running(
+        "NAME",
+        "Pre-filter of the samples, with options after a colon: robust_fir:rate_hz=100 (none).",
+        default="none",
+    )
 
 
 #: Flags by key path of the specification.
@@ -85,27 +63,23 @@ FLAGS = {
     "gnss, path": "--gnss",
     "coarse, kind": "--method",
     "prefilter, kind": "--prefilter",
-    **LOG_FLAGS,
-    **fix_flags("gnss"),
+    **options.LOG_FLAGS,
+    **options.fix_flags("gnss"),
 }
 
 
-@spread
+@options.spread
 def align(
-    source: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOG|CONFIG.toml",
-            help="A log of gyros and accelerometers of a stationary body, or the file of an "
-            "alignment.",
-        ),
-    ],
-    flags: AlignFlags,
+    source: Path = typer.Argument(
+        metavar="LOG|CONFIG.toml",
+        help="A log of gyros and accelerometers of a stationary body, or the file of an alignment.",
+    ),
     *,
-    log: LogFlags,
-    fixes: FixFlags,
-    out: Annotated[Path | None, folder_to_make("LOG-align")] = None,
-    write: ReportFlags,
+    flags: AlignFlags,
+    log: options.LogFlags,
+    fixes: options.FixFlags,
+    out: Path | None = options.folder_to_make("LOG-align"),
+    write: options.ReportFlags,
 ) -> None:
     """Find roll, pitch and heading of a stationary body from its gyros and accelerometers.
 
@@ -113,13 +87,6 @@ def align(
     drifts and biases; the report states the uncertainty of each, its limits, and the alignment
     time.
     """
-    from strapdown.cli.console import WORDS
-    from strapdown.cli.result_folder import (
-        folder_to_write,
-        refuse_result,
-        run_and_save,
-        source_name,
-    )
     from strapdown.config.alignment import AlignmentSpec
     from strapdown.systems.alignment_run import run_alignment
 
@@ -134,7 +101,7 @@ def align(
     refuse_result(source, "log")
     own = source.suffix.lower() == ".toml"
     if own:
-        refuse_beside_file(source, given, FLAGS)
+        options.refuse_beside_file(source, given, FLAGS)
         WORDS.set("file")
     asked = AlignmentSpec.read(source) if own else None
 
@@ -160,21 +127,21 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     from strapdown.config.spec import specify
 
     site = {"lat_deg": given["lat"], "lon_deg": given["lon"], "alt_m": given["alt"]}
-    keys, fixes = log_keys(given), fix_keys(given, given["gnss"])
+    keys, fixes = options.log_keys(given), options.fix_keys(given, given["gnss"])
     try:
         table = specify(LogTable, path=str(log), **keys)
         return specify_alignment(
             ImuFile(table, given["axes"]),
             site={key: float(value) for key, value in site.items() if value is not None},
             sensor=given["sensor"],
-            coarse=module_of_flag(given["method"] or "inertial_frame"),
+            coarse=options.module_of_flag(given["method"] or "inertial_frame"),
             fine=not given["coarse_only"],
             gnss={"path": str(log), **fixes} if fixes else None,
-            prefilter=module_of_flag(given["prefilter"] or "none"),
+            prefilter=options.module_of_flag(given["prefilter"] or "none"),
             called=lambda argument: f"--{argument}",
         )
     except ConfigError as error:
-        raise as_flag(error, FLAGS, _flag) from None
+        raise options.as_flag(error, FLAGS, _flag) from None
 
 
 def _flag(place: str) -> str:
@@ -189,7 +156,6 @@ def _flag(place: str) -> str:
 
 def print_alignment(result: AlignmentRun) -> None:
     """Print the result of an alignment, its limits and its findings."""
-    from strapdown.cli.console import console, print_blocks, print_findings
     from strapdown.report import alignment_document as tables
     from strapdown.report.alignment_document import trust
     from strapdown.report.values import spaced

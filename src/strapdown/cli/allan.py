@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from strapdown.cli.shared_options import (
-    LogFlags,
-    ReportFlags,
-    as_flag,
-    folder_to_make,
-    log_keys,
-    running,
-    spread,
-    writing,
-)
+from strapdown.cli import shared_options as options
+from strapdown.cli.console import console, print_blocks, print_findings
+from strapdown.cli.result_folder import file_beside, folder_to_write, refuse_result, run_and_save
 from strapdown.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -30,39 +23,32 @@ EPILOG = (
 MOST = 4  # findings on the terminal
 
 
-@spread
+@options.spread
 def allan(
-    logs: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="LOG...",
-            help="Log of an unmoved sensor, an hour or more; several logs of one sensor are "
-            "fitted together.",
-        ),
-    ],
-    program: Annotated[
-        str | None,
-        running(
-            "PROGRAM",
-            "Print the noise as the parameters of another program, too: KF-GINS, OB_GINS, GTSAM, "
-            "kalibr, ORB-SLAM3, robot_localization, PX4, NaveGo, PSINS, data-sheet.",
-            "--for",
-        ),
-    ] = None,
-    at_rest: Annotated[
-        bool,
-        running(
-            None, "Use the whole log, or its part, as stationary, without a test.", "--at-rest"
-        ),
-    ] = False,
-    sensor_file: Annotated[
-        Path | None,
-        writing("FILE.toml", "Write the sensor here, for --sensor of navigate and align."),
-    ] = None,
+    logs: list[Path] = typer.Argument(
+        metavar="LOG...",
+        help="Log of an unmoved sensor, an hour or more; several logs of one sensor are "
+        "fitted together.",
+    ),
+    program: str | None = options.running(
+        "PROGRAM",
+        "Print the noise as the parameters of another program, too: KF-GINS, OB_GINS, GTSAM, "
+        "kalibr, ORB-SLAM3, robot_localization, PX4, NaveGo, PSINS, data-sheet.",
+        "--for",
+    ),
+    at_rest: bool = options.running(
+        None,
+        "Use the whole log, or its part, as stationary, without a test.",
+        "--at-rest",
+        default=False,
+    ),
+    sensor_file: Path | None = options.writing(
+        "FILE.toml", "Write the sensor here, for --sensor of navigate and align."
+    ),
     *,
-    flags: LogFlags,
-    out: Annotated[Path | None, folder_to_make("LOG-allan")] = None,
-    write: ReportFlags,
+    flags: options.LogFlags,
+    out: Path | None = options.folder_to_make("LOG-allan"),
+    write: options.ReportFlags,
 ) -> None:
     """Find the noise of a sensor from a log at rest: Allan deviation, noise terms, sensor file.
 
@@ -71,27 +57,20 @@ def allan(
     that the record does not show has an upper bound.
     """
     from strapdown.api.allan import allan as analyse
-    from strapdown.cli.console import print_findings
-    from strapdown.cli.result_folder import (
-        file_beside,
-        folder_to_write,
-        refuse_result,
-        run_and_save,
-    )
 
     for log in logs:
         refuse_result(log, "log")
     beside = file_beside(
         sensor_file, "--sensor-file", write.force, lambda run: str(run.sensor_text())
     )
-    keys = {key: value for key, value in log_keys(flags.given()).items() if value}
+    keys = {key: value for key, value in options.log_keys(flags.given()).items() if value}
 
     def compute(report: Progress) -> AllanRun:
         try:
             keys.update(axes=flags.axes, at_rest=at_rest, target=program)
             return analyse(*map(str, logs), progress=report, **keys)
         except ConfigError as error:
-            raise as_flag(error, {"target": "--for"}) from None
+            raise options.as_flag(error, {"target": "--for"}) from None
 
     def show(result: AllanRun) -> None:
         print_noise(result, sensor_file)
@@ -103,7 +82,6 @@ def allan(
 
 def print_noise(result: AllanRun, sensor_file: Path | None) -> None:
     """Print the terms of each channel, the parameters of another program, and the next command."""
-    from strapdown.cli.console import console, print_blocks
     from strapdown.report.allan import headline, parameter_table, term_tables
     from strapdown.report.values import spaced
 

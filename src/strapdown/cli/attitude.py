@@ -5,14 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
+from strapdown.cli.console import (
+    Stopwatch,
+    console,
+    print_findings,
+    print_seal,
+    print_table,
+    progress,
+)
+from strapdown.cli.result_folder import claim, folder_to_write, refuse_result
 from strapdown.cli.shared_options import (
-    Height,
+    HEIGHT,
+    LONGITUDE,
     LogFlags,
-    Longitude,
     ReportFlags,
     folder_to_make,
     running,
@@ -20,6 +29,7 @@ from strapdown.cli.shared_options import (
     with_what,
     writing,
 )
+from strapdown.errors import ConfigError, printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -38,162 +48,106 @@ EPILOG = (
 class ComparisonFlags:
     """What to compare; the fields of `AttitudeOptions` as a person types them."""
 
-    algorithms: Annotated[
-        str | None,
-        running(
-            "NAMES",
-            "Names joined by blanks or commas, with options after a colon: 'naive "
-            "euler:step=rk4 dcm:order=3 rotvec:samples=3'; or all, with variants. One of each "
-            "(strapdown modules) if not given.",
-        ),
-    ] = None
-    rates: Annotated[
-        str | None,
-        running(
-            "HZ,HZ,…",
-            "Lower rates to try: '100 50 20 10'; the full rate and its halves if not given.",
-        ),
-    ] = None
-    tolerance_deg: Annotated[
-        float,
-        running("DEG", "Tolerance: the largest acceptable error (1).", show_default=False),
-    ] = 1.0
-    interpolation: Annotated[
-        str,
-        running(
-            "KIND",
-            "How rates run between their stamps: linear (the trapezoid), or cubic (linear).",
-            show_default=False,
-        ),
-    ] = "linear"
-    trials: Annotated[
-        int,
-        running("N", "Of a scenario: so many seeds (1).", show_default=False),
-    ] = 1
-    reference: Annotated[
-        list[str] | None,
-        running(
-            "WORDS|FILE",
-            "Known parts of the motion, repeatable: 'end same as start', 'end 2 turns about z "
-            "since start', '12.5 roll 0 pitch 0 heading 90', '8 same place as 2', rests (gravity "
-            "at every rest), a file of such lines (.txt .toml .csv), or an attitude truth.",
-        ),
-    ] = None
-    reference_log: Annotated[
-        Path | None,
-        running(
-            "LOG", "Log of a second, better sensor on the same body, to be taken for the truth."
-        ),
-    ] = None
-    reference_clock: Annotated[
-        str,
-        running(
-            "CLOCK",
-            "Clock of an attitude truth: fitted to the log's by the rotations of both, or as "
-            "stated (fitted).",
-            show_default=False,
-        ),
-    ] = "fitted"
-    initial: Annotated[
-        str,
-        running(
-            "ATTITUDE",
-            "auto, truth, level, zero, or roll,pitch,heading in deg (auto).",
-            show_default=False,
-        ),
-    ] = "auto"
-    gyro_bias: Annotated[
-        str,
-        running(
-            "BIAS",
-            "auto (that of the first rest, if it is significant); none; rest (mean of the first "
-            "stationary stretch); rests (interpolated between all of these); 'x,y,z deg/s' about "
-            "forward, right, down; or a log of the stationary sensor (auto).",
-            show_default=False,
-        ),
-    ] = "auto"
-    magnetometer: Annotated[
-        str,
-        running(
-            "auto|raw|LOG",
-            "Of the filters: hard and soft iron removed where the log shows them; raw, left; or a "
-            "log in which the sensor turned through all directions (auto). With --lat and --lon "
-            "headings are true ones.",
-            show_default=False,
-        ),
-    ] = "auto"
-    lat: Annotated[float | None, with_what("DEG", "Latitude, north positive.")] = None
-    lon: Longitude = None
-    alt: Height = None
-    peers: Annotated[
-        str | None,
-        running(
-            "NAMES",
-            "Other libraries to lay beside: vqf, imufusion, ahrs, or all (the extra 'peers').",
-        ),
-    ] = None
-    seed: Annotated[
-        int | None,
-        running("N", "Of a scenario's simulated errors (0)."),
-    ] = None
-    sensor: Annotated[
-        str | None,
-        running(
-            "NAME|FILE",
-            "Of a scenario: its errors are those of a unit of this sensor of the catalogue "
-            "(strapdown modules), or of a .toml file of your own.",
-        ),
-    ] = None
+    algorithms: str | None = running(
+        "NAMES",
+        "Names joined by blanks or commas, with options after a colon: 'naive "
+        "euler:step=rk4 dcm:order=3 rotvec:samples=3'; or all, with variants. One of each "
+        "(strapdown modules) if not given.",
+    )
+    rates: str | None = running(
+        "HZ,HZ,…", "Lower rates to try: '100 50 20 10'; the full rate and its halves if not given."
+    )
+    tolerance_deg: float = running(
+        "DEG", "Tolerance: the largest acceptable error (1).", default=1.0
+    )
+    interpolation: str = running(
+        "KIND",
+        "How rates run between their stamps: linear (the trapezoid), or cubic (linear).",
+        default="linear",
+    )
+    trials: int = running("N", "Of a scenario: so many seeds (1).", default=1)
+    reference: list[str] | None = running(
+        "WORDS|FILE",
+        "Known parts of the motion, repeatable: 'end same as start', 'end 2 turns about z "
+        "since start', '12.5 roll 0 pitch 0 heading 90', '8 same place as 2', rests (gravity "
+        "at every rest), a file of such lines (.txt .toml .csv), or an attitude truth.",
+    )
+    reference_log: Path | None = running(
+        "LOG", "Log of a second, better sensor on the same body, to be taken for the truth."
+    )
+    reference_clock: str = running(
+        "CLOCK",
+        "Clock of an attitude truth: fitted to the log's by the rotations of both, or as "
+        "stated (fitted).",
+        default="fitted",
+    )
+    initial: str = running(
+        "ATTITUDE", "auto, truth, level, zero, or roll,pitch,heading in deg (auto).", default="auto"
+    )
+    gyro_bias: str = running(
+        "BIAS",
+        "auto (that of the first rest, if it is significant); none; rest (mean of the first "
+        "stationary stretch); rests (interpolated between all of these); 'x,y,z deg/s' about "
+        "forward, right, down; or a log of the stationary sensor (auto).",
+        default="auto",
+    )
+    magnetometer: str = running(
+        "auto|raw|LOG",
+        "Of the filters: hard and soft iron removed where the log shows them; raw, left; or a "
+        "log in which the sensor turned through all directions (auto). With --lat and --lon "
+        "headings are true ones.",
+        default="auto",
+    )
+    lat: float | None = with_what("DEG", "Latitude, north positive.")
+    lon: float | None = LONGITUDE
+    alt: float | None = HEIGHT
+    peers: str | None = running(
+        "NAMES", "Other libraries to lay beside: vqf, imufusion, ahrs, or all (the extra 'peers')."
+    )
+    seed: int | None = running("N", "Of a scenario's simulated errors (0).")
+    sensor: str | None = running(
+        "NAME|FILE",
+        "Of a scenario: its errors are those of a unit of this sensor of the catalogue "
+        "(strapdown modules), or of a .toml file of your own.",
+    )
 
 
 @dataclass(frozen=True)
 class FileFlags:
     """Files beside the result."""
 
-    export: Annotated[
-        Path | None,
-        writing(
-            "FILE",
-            "Write an algorithm or a filter for the rate of the answer, with units, axes and "
-            "biases of this log and a test vector from it: C99 (FILE.c) or MicroPython (FILE.py).",
-        ),
-    ] = None
-    export_of: Annotated[
-        str | None,
-        writing(
-            "NAME",
-            "What --export writes: an algorithm or a filter with its options, such as error-state "
-            "or complementary:declination=3.1; the algorithm that the answer chose if not given.",
-        ),
-    ] = None
-    timing: Annotated[
-        bool,
-        writing(
-            None,
-            "Measure how long a sample takes on this machine, and print it (timing.json has it, "
-            "too).",
-            "--timing",
-        ),
-    ] = False
-    png: Annotated[bool, writing(None, "Draw the figures as PNG, too.", "--png")] = False
+    export: Path | None = writing(
+        "FILE",
+        "Write an algorithm or a filter for the rate of the answer, with units, axes and "
+        "biases of this log and a test vector from it: C99 (FILE.c) or MicroPython (FILE.py).",
+    )
+    export_of: str | None = writing(
+        "NAME",
+        "What --export writes: an algorithm or a filter with its options, such as error-state "
+        "or complementary:declination=3.1; the algorithm that the answer chose if not given.",
+    )
+    timing: bool = writing(
+        None,
+        "Measure how long a sample takes on this machine, and print it (timing.json has it, too).",
+        "--timing",
+        default=False,
+    )
+    png: bool = writing(None, "Draw the figures as PNG, too.", "--png", default=False)
 
 
 @spread
 def attitude(
-    sources: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="LOG|SCENARIO",
-            help="A log (a file or a folder), or a scenario: its name (strapdown modules) or its "
-            "file (.toml). "
-            "Several are trials of one question.",
-        ),
-    ],
+    sources: list[str] = typer.Argument(
+        metavar="LOG|SCENARIO",
+        help="A log (a file or a folder), or a scenario: its name (strapdown modules) or its "
+        "file (.toml). "
+        "Several are trials of one question.",
+    ),
     *,
     compare: ComparisonFlags,
     log: LogFlags,
     files: FileFlags,
-    out: Annotated[Path | None, folder_to_make("LOG-attitude")] = None,
+    out: Path | None = folder_to_make("LOG-attitude"),
     write: ReportFlags,
 ) -> None:
     """Find the simplest attitude algorithm, and the lowest rate, of sufficient accuracy.
@@ -204,9 +158,6 @@ def attitude(
     """
     from strapdown.attitude_comparison.comparison import run_comparison
     from strapdown.bundle import to_json, write_timing
-    from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
-    from strapdown.cli.result_folder import claim, folder_to_write, refuse_result
-    from strapdown.errors import ConfigError
     from strapdown.report.attitude import attitude_json
 
     if files.png:
@@ -283,8 +234,6 @@ def _options(compare: ComparisonFlags, log: LogFlags) -> AttitudeOptions:
 
 def _numbers(text: str | None) -> list[float]:
     """Parse numbers separated by blanks or commas."""
-    from strapdown.errors import ConfigError
-
     try:
         return [float(word) for word in (text or "").replace(",", " ").split()]
     except ValueError:
@@ -312,8 +261,6 @@ def print_comparison(bench: AttitudeComparison, *, verbose: bool = False) -> Non
 
     `verbose`: also the tables that the answer does not rest on.
     """
-    from strapdown.cli.console import console, print_table
-    from strapdown.errors import printable
     from strapdown.report import attitude_tables as tables
     from strapdown.report import attitude_words as words
 
@@ -380,8 +327,6 @@ def _sample_times(bench: AttitudeComparison) -> dict[str, tuple[float, float]]:
 
 def _print_speed(taken: Mapping[str, tuple[float, float]]) -> None:
     """Print the time per sample of each algorithm and filter on this machine."""
-    from strapdown.cli.console import console, print_table
-
     console().print("\nTime of a sample on this machine")
     print_table(
         ["algorithm", "float64, ns", "float32, ns"],
@@ -390,8 +335,6 @@ def _print_speed(taken: Mapping[str, tuple[float, float]]) -> None:
 
 
 def _print_table(table: TableBlock, page: Console) -> None:
-    from strapdown.cli.console import print_table
-
     page.print(f"\n{table.title}", style="bold")
     print_table(table.columns, table.rows, text=table.text, strong=table.strong)
     if table.caption:

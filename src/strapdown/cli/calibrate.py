@@ -4,24 +4,13 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from strapdown.cli.shared_options import (
-    Height,
-    LogFlags,
-    ReportFlags,
-    Sensor,
-    as_flag,
-    flags_by_key,
-    folder_to_make,
-    log_keys,
-    running,
-    spread,
-    with_what,
-    writing,
-)
+from strapdown.cli import shared_options as options
+from strapdown.cli.console import console, print_blocks, print_findings
+from strapdown.cli.result_folder import file_beside, folder_to_write, refuse_result, run_and_save
 from strapdown.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -47,58 +36,48 @@ KEYS = {
 class ProcedureFlags:
     """What was done with the sensor, and what is known of it."""
 
-    procedure: Annotated[
-        str | None,
-        running(
-            "KIND",
-            "positions (rests in nine or more poses), six-position (each face up), turns (by known "
-            "angles), rate-table; by the logs if not given.",
-        ),
-    ] = None
-    turns: Annotated[
-        str | None,
-        running(
-            "ANGLES|TABLE.csv",
-            "Known rotations: 360, every turn of about 360 deg between stops; 'x 720, y 720', in "
-            "order; or a table: axis, angle_deg or rate_deg_per_s, sd_deg, log, from_s, to_s.",
-        ),
-    ] = None
-    turn_sd_deg: Annotated[
-        float | None, running("DEG", "Standard deviation of the known angles (3).", "--turn-sd")
-    ] = None
-    pose_sd_deg: Annotated[
-        float | None,
-        running("DEG", "Standard deviation of the faces in six positions (2).", "--pose-sd"),
-    ] = None
-    gravity_m_per_s2: Annotated[
-        float | None,
-        with_what(
-            "M/S2",
-            "Local gravity, 9.8123; by --lat and --alt, or the Earth's mean, if not given.",
-            "--gravity",
-        ),
-    ] = None
-    lat: Annotated[float | None, with_what("DEG", "Latitude, north positive.")] = None
-    alt: Height = None
-    sensor: Sensor = None
+    procedure: str | None = options.running(
+        "KIND",
+        "positions (rests in nine or more poses), six-position (each face up), turns (by known "
+        "angles), rate-table; by the logs if not given.",
+    )
+    turns: str | None = options.running(
+        "ANGLES|TABLE.csv",
+        "Known rotations: 360, every turn of about 360 deg between stops; 'x 720, y 720', in "
+        "order; or a table: axis, angle_deg or rate_deg_per_s, sd_deg, log, from_s, to_s.",
+    )
+    turn_sd_deg: float | None = options.running(
+        "DEG", "Standard deviation of the known angles (3).", "--turn-sd"
+    )
+    pose_sd_deg: float | None = options.running(
+        "DEG", "Standard deviation of the faces in six positions (2).", "--pose-sd"
+    )
+    gravity_m_per_s2: float | None = options.with_what(
+        "M/S2",
+        "Local gravity, 9.8123; by --lat and --alt, or the Earth's mean, if not given.",
+        "--gravity",
+    )
+    lat: float | None = options.with_what("DEG", "Latitude, north positive.")
+    alt: float | None = options.HEIGHT
+    sensor: str | None = options.SENSOR_MODEL
 
 
-FLAGS = flags_by_key(ProcedureFlags) | {"lat_deg": "--lat", "alt_m": "--alt"}
+FLAGS = options.flags_by_key(ProcedureFlags) | {"lat_deg": "--lat", "alt_m": "--alt"}
 
 
-@spread
+@options.spread
 def calibrate(
-    logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="Logs of one sensor, at rest in poses.")
-    ],
+    logs: list[Path] = typer.Argument(
+        metavar="LOG...", help="Logs of one sensor, at rest in poses."
+    ),
     *,
     asked: ProcedureFlags,
-    flags: LogFlags,
-    calibration_file: Annotated[
-        Path | None, writing("FILE.toml", "Write the calibration here, for --calibration.")
-    ] = None,
-    out: Annotated[Path | None, folder_to_make("LOG-calibrate")] = None,
-    write: ReportFlags,
+    flags: options.LogFlags,
+    calibration_file: Path | None = options.writing(
+        "FILE.toml", "Write the calibration here, for --calibration."
+    ),
+    out: Path | None = options.folder_to_make("LOG-calibrate"),
+    write: options.ReportFlags,
 ) -> None:
     """Find bias, scale, misalignment and g-sensitivity of a sensor from rests and turns.
 
@@ -107,13 +86,6 @@ def calibrate(
     pose or turn that would. A magnetometer is calibrated, too.
     """
     from strapdown.api.calibrate import calibrate as find
-    from strapdown.cli.console import print_findings
-    from strapdown.cli.result_folder import (
-        file_beside,
-        folder_to_write,
-        refuse_result,
-        run_and_save,
-    )
 
     for log in logs:
         key, _, value = log.name.partition("=")
@@ -126,14 +98,14 @@ def calibrate(
     beside = file_beside(
         calibration_file, "--calibration-file", write.force, lambda run: str(run.calibration_text())
     )
-    keys = {key: value for key, value in log_keys(flags.given()).items() if value}
+    keys = {key: value for key, value in options.log_keys(flags.given()).items() if value}
     keys |= {key: value for key, value in asdict(asked).items() if value is not None}
 
     def compute(report: Progress) -> CalibrateRun:
         try:
             return find([str(log) for log in logs], progress=report, **keys)
         except ConfigError as error:
-            raise as_flag(error, FLAGS) from None
+            raise options.as_flag(error, FLAGS) from None
 
     def show(result: CalibrateRun) -> None:
         print_calibration(result)
@@ -145,7 +117,6 @@ def calibrate(
 
 def print_calibration(result: CalibrateRun) -> None:
     """Print the errors with their bounds, and what the calibration changes."""
-    from strapdown.cli.console import console, print_blocks
     from strapdown.report.calibrate import (
         effect_table,
         field_table,

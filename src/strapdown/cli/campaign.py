@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from typer.core import TyperGroup
 
+from strapdown.cli.console import console, print_blocks, print_findings, progress
+from strapdown.cli.result_folder import default_folder, run_and_save
 from strapdown.cli.shared_options import ReportFlags, folder_to_make, running, spread, writing
+from strapdown.errors import ConfigError, Finding
 
 if TYPE_CHECKING:
     from strapdown.bundle import Seal
@@ -41,21 +44,16 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-WorkersFlag = Annotated[
-    int | None, running("N", "Cases at a time (the cores of this machine).", "--workers", min=1)
-]
-Scheduler = Annotated[
-    str | None,
-    running(
-        "ADDRESS",
-        "Scheduler of dask, tcp://HOST:8786, instead of this machine; its workers are those of "
-        "strapdown worker.",
-    ),
-]
-Dashboard = Annotated[
-    bool, running(None, "Serve the dashboard of dask on the loopback interface.", "--dashboard")
-]
-Folder = Annotated[Path, typer.Argument(metavar="DIR", help=DIR)]
+WORKERS = running("N", "Cases at a time (the cores of this machine).", "--workers", min=1)
+SCHEDULER = running(
+    "ADDRESS",
+    "Scheduler of dask, tcp://HOST:8786, instead of this machine; its workers are those of "
+    "strapdown worker.",
+)
+DASHBOARD = running(
+    None, "Serve the dashboard of dask on the loopback interface.", "--dashboard", default=False
+)
+FOLDER = typer.Argument(metavar="DIR", help=DIR)
 
 
 @app.callback(epilog=EPILOG)
@@ -70,22 +68,20 @@ def campaign() -> None:
 @app.command("run")
 @spread
 def run(
-    file: Annotated[Path, typer.Argument(metavar="CAMPAIGN.toml", help="File of the campaign.")],
+    file: Path = typer.Argument(metavar="CAMPAIGN.toml", help="File of the campaign."),
     *,
-    workers: WorkersFlag = None,
-    scheduler: Scheduler = None,
-    part: Annotated[
-        str | None,
-        running("K/N", "Run the K-th of N parts of the cases alone; merge puts them together."),
-    ] = None,
-    dashboard: Dashboard = False,
-    out: Annotated[Path | None, folder_to_make("CAMPAIGN-campaign")] = None,
+    workers: int | None = WORKERS,
+    scheduler: str | None = SCHEDULER,
+    part: str | None = running(
+        "K/N", "Run the K-th of N parts of the cases alone; merge puts them together."
+    ),
+    dashboard: bool = DASHBOARD,
+    out: Path | None = folder_to_make("CAMPAIGN-campaign"),
     write: ReportFlags,
 ) -> None:
     """Run a campaign from its file."""
     from strapdown.campaign.engine import Workers
     from strapdown.campaign.run import WORKING, run_campaign
-    from strapdown.cli.result_folder import default_folder
 
     folder = out or default_folder(file, "campaign")
     share = _part(part)
@@ -107,18 +103,17 @@ def run(
 @app.command("resume")
 @spread
 def resume(
-    folder: Folder,
+    folder: Path = FOLDER,
     *,
-    workers: WorkersFlag = None,
-    scheduler: Scheduler = None,
-    dashboard: Dashboard = False,
+    workers: int | None = WORKERS,
+    scheduler: str | None = SCHEDULER,
+    dashboard: bool = DASHBOARD,
     write: ReportFlags,
 ) -> None:
     """Go on with a campaign that was ended: the cases without a result are run."""
     from strapdown.campaign.engine import Workers
     from strapdown.campaign.run import WORKING, open_campaign
     from strapdown.campaign.run import resume as go_on
-    from strapdown.errors import ConfigError
 
     name = folder.name.removesuffix(WORKING)
     working, made = folder.with_name(name + WORKING), folder.with_name(name)
@@ -141,8 +136,6 @@ def _run(folder: Path, write: Any, compute: Any, *, complete: bool = True) -> No
     import shutil
 
     from strapdown.campaign.run import WORKING
-    from strapdown.cli.console import console
-    from strapdown.cli.result_folder import run_and_save
 
     working = folder.with_name(folder.name + WORKING)
 
@@ -150,8 +143,6 @@ def _run(folder: Path, write: Any, compute: Any, *, complete: bool = True) -> No
         console(err=True).print(f"Dashboard: {address}", markup=False)
 
     if not complete:
-        from strapdown.cli.console import progress
-
         with progress(write.quiet or write.json) as show:
             made = compute(show, shown)
         if not write.quiet:
@@ -193,16 +184,13 @@ def _counted(report: Stopwatch) -> Progress:
 
 @app.command("merge")
 def merge(
-    folders: Annotated[
-        list[Path], typer.Argument(metavar="DIR...", help="Folders of the parts of one campaign.")
-    ],
-    out: Annotated[
-        Path, writing("DIR", "Folder of the merged campaign.", "--out", show_default=False)
-    ],
+    folders: list[Path] = typer.Argument(
+        metavar="DIR...", help="Folders of the parts of one campaign."
+    ),
+    out: Path = writing("DIR", "Folder of the merged campaign.", "--out", default=...),
 ) -> None:
     """Put the parts of a campaign from several machines together; resume completes it."""
     from strapdown.campaign.run import WORKING, merge_parts
-    from strapdown.cli.console import console
 
     working = out.with_name(out.name + WORKING)
     missing = merge_parts(folders, working)
@@ -212,12 +200,11 @@ def merge(
 
 @app.command("status")
 def status(
-    folder: Folder,
-    as_json: Annotated[bool, writing(None, "Print as JSON, for programs.", "--json")] = False,
+    folder: Path = FOLDER,
+    as_json: bool = writing(None, "Print as JSON, for programs.", "--json", default=False),
 ) -> None:
     """Show how many cases of a campaign are done, and what became of them."""
     from strapdown.campaign.run import open_campaign
-    from strapdown.cli.console import console
 
     found = open_campaign(folder)
     counts: dict[str, int] = {}
@@ -245,14 +232,11 @@ def status(
 
 @app.command("report")
 def report(
-    folder: Folder,
-    out: Annotated[
-        Path | None, writing("FILE.html", "Page to write (DIR-report.html).", "--out")
-    ] = None,
+    folder: Path = FOLDER,
+    out: Path | None = writing("FILE.html", "Page to write (DIR-report.html).", "--out"),
 ) -> None:
     """Write the page of a campaign as it is now, complete or not."""
     from strapdown.campaign.run import report_now
-    from strapdown.cli.console import console
 
     path = out or folder.with_name(f"{folder.name}-report.html")
     report_now(folder, path)
@@ -261,17 +245,13 @@ def report(
 
 @app.command("case")
 def case(
-    folder: Folder,
-    number: Annotated[int, typer.Argument(metavar="CASE", help="Number of the case.", min=0)],
-    out: Annotated[
-        Path | None, writing("DIR", "Folder to create (DIR-case-CASE).", "--out")
-    ] = None,
-    force: Annotated[bool, writing(None, "Overwrite an existing result.", "--force")] = False,
+    folder: Path = FOLDER,
+    number: int = typer.Argument(metavar="CASE", help="Number of the case.", min=0),
+    out: Path | None = writing("DIR", "Folder to create (DIR-case-CASE).", "--out"),
+    force: bool = writing(None, "Overwrite an existing result.", "--force", default=False),
 ) -> None:
     """Run one case by itself, to the same bits, with its full report."""
     from strapdown.campaign.run import case_of, differing, open_campaign, save_case
-    from strapdown.cli.console import console, print_findings
-    from strapdown.errors import Finding
 
     found = open_campaign(folder)
     result, row, recorded = case_of(folder, number)
@@ -300,7 +280,6 @@ def case(
 def print_campaign(frozen: dict[str, Any], summary: dict[str, Any], name: str) -> None:
     """Print the answers that the first page of the report shows."""
     from strapdown.campaign.page import campaign_document
-    from strapdown.cli.console import console, print_blocks
     from strapdown.report.document import Items, KeyFigures, Paragraph, TableBlock
     from strapdown.report.values import spaced
 

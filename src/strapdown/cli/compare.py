@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
+from strapdown.cli.console import console, print_blocks, print_findings
+from strapdown.cli.console import progress as bar
+from strapdown.cli.result_folder import run_and_save
 from strapdown.cli.shared_options import ReportFlags, spread, writing
 
 if TYPE_CHECKING:
@@ -23,19 +26,13 @@ CHANGED = 6
 
 @spread
 def compare(
-    runs: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RUN...",
-            help="Folders of results, of any command; or configurations (.toml) of navigate, align "
-            "or crash, which are run first.",
-        ),
-    ],
+    runs: list[Path] = typer.Argument(
+        metavar="RUN...",
+        help="Folders of results, of any command; or configurations (.toml) of navigate, align "
+        "or crash, which are run first.",
+    ),
     *,
-    out: Annotated[
-        Path | None,
-        writing("DIR", "Write a page, the data and the runs into this folder."),
-    ] = None,
+    out: Path | None = writing("DIR", "Write a page, the data and the runs into this folder."),
     write: ReportFlags,
 ) -> None:
     """Show what differs between results: options, inputs, numbers, and positions over time.
@@ -45,7 +42,6 @@ def compare(
     a temporary folder, and kept only by --out.
     """
     from strapdown.bundle import to_json
-    from strapdown.cli.result_folder import run_and_save
     from strapdown.report.compare import compare_results, comparison_json
 
     def compute(progress: Progress) -> RunComparison:
@@ -55,8 +51,6 @@ def compare(
     if out is not None:
         result = run_and_save(compute, out, write, "compare.json", show)
     else:
-        from strapdown.cli.console import progress as bar
-
         with bar(write.quiet or write.json) as report:
             result = compute(report)
         if write.json:
@@ -68,7 +62,6 @@ def compare(
 
 
 def _print(result: RunComparison, *, verbose: bool) -> None:
-    from strapdown.cli.console import console, print_blocks, print_findings
     from strapdown.report import compare_document as page
     from strapdown.report.values import spaced
 

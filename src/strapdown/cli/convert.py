@@ -5,20 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
-from strapdown.cli.shared_options import (
-    FixFlags,
-    LogFlags,
-    OutFlags,
-    as_origin,
-    fix_keys,
-    log_keys,
-    spread,
-    writing,
-)
+from strapdown.cli import shared_options as options
+from strapdown.cli.console import console, print_findings, print_table
 from strapdown.errors import ConfigError, check_choice
 
 EPILOG = (
@@ -32,50 +24,38 @@ EPILOG = (
 class TargetFlags:
     """Format of the result, and what it needs that no log states."""
 
-    form: Annotated[
-        str | None,
-        writing(
-            "FORMAT",
-            "Format of OUT (strapdown modules), if its ending does not say it: euroc, kitti, "
-            "kf-gins are folders.",
-            "--as",
-        ),
-    ] = None
-    streams: Annotated[
-        str | None,
-        writing("NAMES", "Only these: imu,gnss,reference,magnetometer,barometer,wheel,heading."),
-    ] = None
-    epoch: Annotated[
-        str | None,
-        writing("DATE", "Instant of stamp zero, for a clock that is not related to UTC."),
-    ] = None
-    origin: Annotated[
-        str | None,
-        writing(
-            "LAT,LON,HEIGHT",
-            "Origin of formats with local axes, deg, deg, m over the ellipsoid (first position).",
-        ),
-    ] = None
-    geoid: Annotated[
-        float | None,
-        writing("M", "Height of the geoid over the ellipsoid, for heights over the sea."),
-    ] = None
+    form: str | None = options.writing(
+        "FORMAT",
+        "Format of OUT (strapdown modules), if its ending does not say it: euroc, kitti, "
+        "kf-gins are folders.",
+        "--as",
+    )
+    streams: str | None = options.writing(
+        "NAMES", "Only these: imu,gnss,reference,magnetometer,barometer,wheel,heading."
+    )
+    epoch: str | None = options.writing(
+        "DATE", "Instant of stamp zero, for a clock that is not related to UTC."
+    )
+    origin: str | None = options.writing(
+        "LAT,LON,HEIGHT",
+        "Origin of formats with local axes, deg, deg, m over the ellipsoid (first position).",
+    )
+    geoid: float | None = options.writing(
+        "M", "Height of the geoid over the ellipsoid, for heights over the sea."
+    )
 
 
-@spread
+@options.spread
 def convert(
-    paths: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="IN... OUT",
-            help="Logs, fixes, trajectories or results, and the file or folder to make.",
-        ),
-    ],
-    target: TargetFlags,
+    paths: list[Path] = typer.Argument(
+        metavar="IN... OUT",
+        help="Logs, fixes, trajectories or results, and the file or folder to make.",
+    ),
     *,
-    log: LogFlags,
-    fixes: FixFlags,
-    write: OutFlags,
+    target: TargetFlags,
+    log: options.LogFlags,
+    fixes: options.FixFlags,
+    write: options.OutFlags,
 ) -> None:
     """Write what a log, a file of fixes or a trajectory holds in another format.
 
@@ -85,7 +65,6 @@ def convert(
     from strapdown.api.writing import read_streams, writer_streams
     from strapdown.api.writing import write as write_file
     from strapdown.bundle import to_json
-    from strapdown.cli.console import console, print_findings, print_table
     from strapdown.formats import STREAMS
     from strapdown.formats.clocks import clock_of
 
@@ -93,16 +72,16 @@ def convert(
         raise ConfigError("cli.convert-needs-two", quantity="OUT")
     *sources, out = paths
     held = writer_streams(out, target.form)
-    epoch, origin = _date(target.epoch), as_origin(target.origin, "--origin")
+    epoch, origin = _date(target.epoch), options.as_origin(target.origin, "--origin")
     wanted = [w.strip() for w in target.streams.split(",")] if target.streams else list(STREAMS)
     for name in wanted:
         check_choice("cli.no-such-stream", STREAMS, quantity="--streams", name=name)
     given: dict[str, Any] = {**log.given(), **fixes.given()}
     found, findings = read_streams(
         sources,
-        log_keys(given),
+        options.log_keys(given),
         given["axes"],
-        fix_keys(given, None),
+        options.fix_keys(given, None),
         [name for name in wanted if name in held],
     )
     chosen = {name: table for name, table in found.items() if name in wanted}

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from strapdown.cli.shared_options import (
-    Recover,
-    ReportFlags,
-    Token,
-    folder_to_make,
-    missing_argument,
-    running,
-    spread,
-    writing,
+from strapdown.cli import shared_options as options
+from strapdown.cli.console import (
+    WORDS,
+    Stopwatch,
+    console,
+    print_blocks,
+    print_findings,
+    print_seal,
+    progress,
 )
+from strapdown.cli.result_folder import claim, folder_to_write, refuse_result
+from strapdown.errors import printable
 
 if TYPE_CHECKING:
     from strapdown.crash.case import CaseResult
@@ -32,52 +34,40 @@ EPILOG = (
 class LiveFlags:
     """Detection while samples arrive, and on a microcontroller."""
 
-    live: Annotated[
-        str | None,
-        running(
-            "-|udp://HOST:PORT",
-            "Detect a crash in samples as they come, as lines of standard input or of datagrams, "
-            "by the recorder of the case.",
-        ),
-    ] = None
-    every: Annotated[
-        float | None,
-        running("S", "With --live: an estimate of an event so often (0.01).", show_default=False),
-    ] = None
-    calibration: Annotated[
-        Path | None,
-        running(
-            "RESULT",
-            "With --live or --export: a result of strapdown crash in which the drive determined "
-            "biases, scale factors and mounting of the recorder; they are taken off.",
-        ),
-    ] = None
-    token: Token = None
-    recover: Recover = None
-    export: Annotated[
-        Path | None,
-        writing(
-            "FILE.c",
-            "Write the detection of --live for the recorder of the case as C99, with a test "
-            "vector, and nothing else.",
-        ),
-    ] = None
+    live: str | None = options.running(
+        "-|udp://HOST:PORT",
+        "Detect a crash in samples as they come, as lines of standard input or of datagrams, "
+        "by the recorder of the case.",
+    )
+    every: float | None = options.running(
+        "S", "With --live: an estimate of an event so often (0.01)."
+    )
+    calibration: Path | None = options.running(
+        "RESULT",
+        "With --live or --export: a result of strapdown crash in which the drive determined "
+        "biases, scale factors and mounting of the recorder; they are taken off.",
+    )
+    token: str | None = options.TOKEN
+    recover: Path | None = options.RECOVER
+    export: Path | None = options.writing(
+        "FILE.c",
+        "Write the detection of --live for the recorder of the case as C99, with a test "
+        "vector, and nothing else.",
+    )
 
 
-@spread
+@options.spread
 def crash(
-    cases: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            metavar="CASE.toml...",
-            help="The case of each vehicle; strapdown init crash writes them.",
-            show_default=False,
-        ),
-    ] = None,
+    cases: list[Path] | None = typer.Argument(
+        None,
+        metavar="CASE.toml...",
+        help="The case of each vehicle; strapdown init crash writes them.",
+        show_default=False,
+    ),
     *,
     flags: LiveFlags,
-    out: Annotated[Path | None, folder_to_make("CASE-crash, with --live CASE-crash-live")] = None,
-    write: ReportFlags,
+    out: Path | None = options.folder_to_make("CASE-crash, with --live CASE-crash-live"),
+    write: options.ReportFlags,
 ) -> None:
     """Reconstruct a crash: delta-V, direction of force, severity and path, each with its bound.
 
@@ -95,7 +85,7 @@ def crash(
         recover_crash(cases or None, out, write, flags)
         return
     if not cases:
-        raise missing_argument("CASE.toml...")
+        raise options.missing_argument("CASE.toml...")
     if any(one is not None for one in asdict(flags).values()):
         from strapdown.cli.crash_live import crash_live
 
@@ -103,17 +93,6 @@ def crash(
         return
     from strapdown.api.crash import reconstruct
     from strapdown.bundle import MANIFEST, Seal, sha256, write_timing
-    from strapdown.cli.console import (
-        WORDS,
-        Stopwatch,
-        console,
-        print_blocks,
-        print_findings,
-        print_seal,
-        progress,
-    )
-    from strapdown.cli.result_folder import claim, folder_to_write, refuse_result
-    from strapdown.errors import printable
     from strapdown.report.values import shown_in
 
     for case in cases:
@@ -159,7 +138,6 @@ def crash(
 
 def print_crash(result: CaseResult) -> None:
     """Print the results of a case, and their limits."""
-    from strapdown.cli.console import console, print_blocks
     from strapdown.report.crash_tables import (
         answers_table,
         closure_table,

@@ -13,18 +13,8 @@ import typer
 
 from strapdown.bundle import write_latency
 from strapdown.bundle.atomic_folder import replace_file
+from strapdown.cli import live_folder
 from strapdown.cli.console import WORDS, print_seal
-from strapdown.cli.live_folder import (
-    begin_journal,
-    open_lines,
-    output_of,
-    recovered,
-    refuse_beside_recover,
-    remove_empty,
-    remove_received,
-    sealing,
-    warner,
-)
 from strapdown.cli.navigate_live import line_writer
 from strapdown.cli.navigate_tables import print_latency
 from strapdown.cli.result_folder import claim, default_folder, refuse_result
@@ -33,15 +23,8 @@ from strapdown.errors import ConfigError
 from strapdown.live.crash import receive_crash, recorder_of_case
 from strapdown.live.journal import Journal
 from strapdown.live.replay import MachineClock
+from strapdown.report import crash_live as report
 from strapdown.report.attitude_export import check_export
-from strapdown.report.crash_live import (
-    COMMAND,
-    DETECTIONS,
-    RECEIVED,
-    recorder_of,
-    write_crash_live,
-    write_received,
-)
 
 if TYPE_CHECKING:
     from strapdown.cli.crash import LiveFlags
@@ -86,14 +69,14 @@ def crash_live(
     claim(folder, write.force)
     every = EVERY if flags.every is None else flags.every
     run = {"configuration": {"recorder": asdict(options)}, "every": every}
-    _run(begin_journal(folder, COMMAND, run), folder, write, flags)
+    _run(live_folder.begin_journal(folder, report.COMMAND, run), folder, write, flags)
 
 
 def recover_crash(
     cases: Sequence[Path] | None, out: Path | None, write: ReportFlags, flags: LiveFlags
 ) -> None:
     """Finish, or with ``--live`` continue, a run that was killed, from what it had received."""
-    refuse_beside_recover(
+    live_folder.refuse_beside_recover(
         {
             "CASE.toml": cases,
             "--export": flags.export,
@@ -103,30 +86,30 @@ def recover_crash(
     )
     assert flags.recover is not None
     WORDS.set("file")
-    journal = recovered(flags.recover, COMMAND, warner(write.quiet))
-    with sealing(journal):
-        folder = output_of(journal, out, write.force)
+    journal = live_folder.recovered(flags.recover, report.COMMAND, live_folder.warner(write.quiet))
+    with live_folder.sealing(journal):
+        folder = live_folder.output_of(journal, out, write.force)
     _run(journal, folder, write, flags)
 
 
 def _run(journal: Journal, folder: Path, write: ReportFlags, flags: LiveFlags) -> None:
     """Detect crashes in what the journal has, and in what comes; and write the bundle."""
-    clock, warn = MachineClock(), warner(write.quiet)
-    options = recorder_of(journal.run["configuration"])
+    clock, warn = MachineClock(), live_folder.warner(write.quiet)
+    options = report.recorder_of(journal.run["configuration"])
     every = journal.run["every"] if flags.every is None else flags.every
-    with sealing(journal):
-        source = open_lines(flags.live, clock, flags.token, warn)
+    with live_folder.sealing(journal):
+        source = live_folder.open_lines(flags.live, clock, flags.token, warn)
         got = receive_crash(options, source, clock, line_writer, warn, every, journal)
         if got.rows.count:
-            record = journal.folder / RECEIVED
-            write_received(record, got.rows.rows)
-            seal = write_crash_live(
+            record = journal.folder / report.RECEIVED
+            report.write_received(record, got.rows.rows)
+            seal = report.write_crash_live(
                 options, record, folder, every=every, log=got.log, force=write.force
             )
             journal.sealed(seal.digest)
     if not got.log.watch.samples:
-        remove_empty(journal, source is not None)
-    remove_received(journal, seal.path)
+        live_folder.remove_empty(journal, source is not None)
+    live_folder.remove_received(journal, seal.path)
     latency, own = got.tape.latency(), got.processing.latency()
     told: dict[str, Any] = {
         **({} if latency is None else latency.told()),
@@ -142,4 +125,4 @@ def _run(journal: Journal, folder: Path, write: ReportFlags, flags: LiveFlags) -
             # Of lines that come all at once, the time from a sample to its state is their queue.
             if own is not None:
                 print_latency(own, flags.live or "", "processing of a sample")
-            print_seal(seal, DETECTIONS)
+            print_seal(seal, report.DETECTIONS)

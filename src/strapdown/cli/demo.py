@@ -8,9 +8,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
+from strapdown.cli.console import console
+from strapdown.cli.result_folder import claim
 from strapdown.cli.shared_options import WriteFlags, folder_to_make, spread
+from strapdown.errors import ConfigError
 
 if TYPE_CHECKING:
     from strapdown.progress import Progress
@@ -27,7 +30,7 @@ _RECORDING = "phone-recording"
 @spread
 def demo(
     *,
-    out: Annotated[Path, folder_to_make("demo")] = Path("demo"),
+    out: Path = folder_to_make("demo", default=Path("demo")),
     write: WriteFlags,
 ) -> None:
     """Run all systems and show the results on one page: navigation, attitude, crash.
@@ -36,7 +39,6 @@ def demo(
     in the folder named by STRAPDOWN_DATA, by default ../shared/data.
     """
     from strapdown.bundle.atomic_folder import replace_file
-    from strapdown.cli.console import console
     from strapdown.report.demo_page import demo_page, shown_answer, shown_truth
 
     data = Path(os.environ.get("STRAPDOWN_DATA", "../shared/data"))
@@ -93,9 +95,6 @@ def _part_of(show: Progress, title: str, begin: float, share: float) -> Progress
 
 def _check(out: Path, names: list[str], force: bool) -> None:
     """Refuse before the first run what a later one would refuse."""
-    from strapdown.cli.result_folder import claim
-    from strapdown.errors import ConfigError
-
     for name in (*names, _PAGE):
         if "." not in name:
             claim(out / name, force)

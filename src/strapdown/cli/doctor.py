@@ -5,21 +5,13 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from strapdown.cli.shared_options import (
-    FixFlags,
-    LogFlags,
-    ReportFlags,
-    as_flag,
-    fix_keys,
-    folder_to_make,
-    log_keys,
-    spread,
-    writing,
-)
+from strapdown.cli import shared_options as options
+from strapdown.cli.console import console, print_blocks, print_findings
+from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
 from strapdown.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -34,25 +26,21 @@ EPILOG = (
 MOST, WIDTH = 8, 300
 
 
-@spread
+@options.spread
 def doctor(
-    logs: Annotated[
-        list[Path],
-        typer.Argument(metavar="LOG…", help="Logs, or folders of recordings.", show_default=False),
-    ],
-    fix: Annotated[
-        Path | None,
-        writing(
-            "FILE",
-            "Write a clean log (.parquet or .csv): SI, body axes, increasing stamps; other streams "
-            "and the record of what was done beside it.",
-        ),
-    ] = None,
+    logs: list[Path] = typer.Argument(
+        metavar="LOG…", help="Logs, or folders of recordings.", show_default=False
+    ),
+    fix: Path | None = options.writing(
+        "FILE",
+        "Write a clean log (.parquet or .csv): SI, body axes, increasing stamps; other streams "
+        "and the record of what was done beside it.",
+    ),
     *,
-    flags: LogFlags,
-    fixes: FixFlags,
-    out: Annotated[Path | None, folder_to_make("LOG-doctor")] = None,
-    write: ReportFlags,
+    flags: options.LogFlags,
+    fixes: options.FixFlags,
+    out: Path | None = options.folder_to_make("LOG-doctor"),
+    write: options.ReportFlags,
 ) -> None:
     """Examine logs: what is in them, what is wrong, the fix, and what they suffice for.
 
@@ -61,21 +49,19 @@ def doctor(
     something open is examined with the answers as inferred, and the questions are listed.
     """
     from strapdown.api.doctor import doctor as examine
-    from strapdown.cli.console import console, print_findings
-    from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
     from strapdown.systems.clean_log import axes_of_clean_log, write_clean_log
 
     for log in logs:
         refuse_result(log, "log")
-    keys = {key: value for key, value in log_keys(flags.given()).items() if value}
+    keys = {key: value for key, value in options.log_keys(flags.given()).items() if value}
 
     def compute(report: Progress) -> Diagnosis:
         try:
             paths = [str(log) for log in logs]
-            gnss = fix_keys(fixes.given(), None)
+            gnss = options.fix_keys(fixes.given(), None)
             return examine(paths, axes=flags.axes, gnss=gnss, progress=report, **keys)
         except ConfigError as error:
-            raise as_flag(error, {}) from None
+            raise options.as_flag(error, {}) from None
 
     def show(result: Diagnosis) -> None:
         paths = {one.name: one.log.path for one in result.logs}
@@ -101,7 +87,6 @@ def print_log(
     `paths`: of logs by name, for commands. `logs`: paths of all that were examined.
     `tables`: also those of channels and rests.
     """
-    from strapdown.cli.console import console, print_blocks
     from strapdown.report import doctor as report
     from strapdown.report.values import spaced
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
+from strapdown.cli.console import console
 from strapdown.cli.shared_options import OutFlags, spread
 
 EPILOG = (
@@ -18,17 +18,13 @@ EPILOG = (
 
 @spread
 def export(
-    module: Annotated[
-        str,
-        typer.Argument(
-            metavar="MODULE",
-            help="What to write, with its options, such as ned:height=damped (strapdown modules).",
-        ),
-    ],
-    file: Annotated[
-        Path,
-        typer.Argument(metavar="FILE", help="FILE.c: C99; FILE.py: MicroPython, of an attitude."),
-    ],
+    module: str = typer.Argument(
+        metavar="MODULE",
+        help="What to write, with its options, such as ned:height=damped (strapdown modules).",
+    ),
+    file: Path = typer.Argument(
+        metavar="FILE", help="FILE.c: C99; FILE.py: MicroPython, of an attitude."
+    ),
     *,
     write: OutFlags,
 ) -> None:
@@ -39,7 +35,6 @@ def export(
     """
     from strapdown.bundle import to_json
     from strapdown.bundle.atomic_folder import replace_file
-    from strapdown.cli.console import console
     from strapdown.report.attitude_export import WRITERS, check_export, export_module
 
     check_export(file, write.force, quantity="FILE")

@@ -4,25 +4,13 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from strapdown.cli.shared_options import (
-    FixFlags,
-    LogFlags,
-    ReportFlags,
-    Sensor,
-    as_flag,
-    fix_flags,
-    fix_keys,
-    flags_by_key,
-    folder_to_make,
-    log_keys,
-    running,
-    spread,
-    with_what,
-)
+from strapdown.cli import shared_options as options
+from strapdown.cli.console import console, print_blocks, print_findings
+from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
 from strapdown.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -40,51 +28,45 @@ MOST = 6  # findings on the terminal
 class PairFlags:
     """The other sensor, and what is known of both, by argument of `find`."""
 
-    kind: Annotated[
-        str | None,
-        running("imu|magnetometer|gnss", "What OTHER is, if it is not found.", "--kind"),
-    ] = None
-    offset: Annotated[
-        float | None,
-        running("S", "Clock of OTHER less that of LOG, to 0.3 s; searched, if not given."),
-    ] = None
-    not_on_wheels: Annotated[
-        bool,
-        running(
-            None, "With fixes: the vehicle does not roll; no mounting angles.", "--not-on-wheels"
-        ),
-    ] = False
-    sensor: Sensor = None
-    other_axes: Annotated[
-        str | None, running("X,Y,Z", "Axes of OTHER, as --axes of LOG.", "--other-axes")
-    ] = None
-    other_calibration: Annotated[
-        Path | None,
-        running("FILE.toml", "Of OTHER, as --calibration of LOG.", "--other-calibration"),
-    ] = None
-    heading_deg: Annotated[
-        float | None,
-        with_what("DEG", "Initial heading, if neither gyros nor course determine it.", "--heading"),
-    ] = None
+    kind: str | None = options.running(
+        "imu|magnetometer|gnss", "What OTHER is, if it is not found.", "--kind"
+    )
+    offset: float | None = options.running(
+        "S", "Clock of OTHER less that of LOG, to 0.3 s; searched, if not given."
+    )
+    not_on_wheels: bool = options.running(
+        None,
+        "With fixes: the vehicle does not roll; no mounting angles.",
+        "--not-on-wheels",
+        default=False,
+    )
+    sensor: str | None = options.SENSOR_MODEL
+    other_axes: str | None = options.running(
+        "X,Y,Z", "Axes of OTHER, as --axes of LOG.", "--other-axes"
+    )
+    other_calibration: Path | None = options.running(
+        "FILE.toml", "Of OTHER, as --calibration of LOG.", "--other-calibration"
+    )
+    heading_deg: float | None = options.with_what(
+        "DEG", "Initial heading, if neither gyros nor course determine it.", "--heading"
+    )
 
 
-@spread
+@options.spread
 def extrinsics(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="Log of gyros and accelerometers, a.")],
-    other: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="OTHER",
-            help="The other sensor, b: a second log, a magnetometer, fixes of an antenna; without "
-            "it, the magnetometer in LOG.",
-        ),
-    ] = None,
+    log: Path = typer.Argument(metavar="LOG", help="Log of gyros and accelerometers, a."),
+    other: Path | None = typer.Argument(
+        None,
+        metavar="OTHER",
+        help="The other sensor, b: a second log, a magnetometer, fixes of an antenna; without "
+        "it, the magnetometer in LOG.",
+    ),
     *,
     asked: PairFlags,
-    flags: LogFlags,
-    fixes: FixFlags,
-    out: Annotated[Path | None, folder_to_make("LOG-extrinsics")] = None,
-    write: ReportFlags,
+    flags: options.LogFlags,
+    fixes: options.FixFlags,
+    out: Path | None = options.folder_to_make("LOG-extrinsics"),
+    write: options.ReportFlags,
 ) -> None:
     """Find rotation, lever arm and time offset between two sensors on one rigid body.
 
@@ -93,15 +75,14 @@ def extrinsics(
     """
     from strapdown.api.extrinsics import extrinsics as find
     from strapdown.api.reading import read_gnss
-    from strapdown.cli.result_folder import folder_to_write, refuse_result, run_and_save
 
     refuse_result(log, "log")
-    keys: dict[str, Any] = {k: v for k, v in log_keys(flags.given()).items() if v}
+    keys: dict[str, Any] = {k: v for k, v in options.log_keys(flags.given()).items() if v}
     keys |= {**asdict(asked), "axes": flags.axes}
     keys["wheels"] = not keys.pop("not_on_wheels")
     if asked.other_calibration is not None:
         keys["other_calibration"] = str(asked.other_calibration)
-    of_fixes = fix_keys(fixes.given(), None)
+    of_fixes = options.fix_keys(fixes.given(), None)
 
     def compute(report: Progress) -> ExtrinsicsRun:
         try:
@@ -113,7 +94,7 @@ def extrinsics(
                 **keys,
             )
         except ConfigError as error:
-            raise as_flag(error, FLAGS) from None
+            raise options.as_flag(error, FLAGS) from None
 
     folder = folder_to_write(out, log, "extrinsics", write.force)
     run_and_save(
@@ -127,14 +108,13 @@ FLAGS = {
     "gnss": "OTHER",
     "offset_s": "--offset",
     "heading": "--heading",
-    **flags_by_key(PairFlags),
-    **fix_flags("navigation, aiding, gnss"),
+    **options.flags_by_key(PairFlags),
+    **options.fix_flags("navigation, aiding, gnss"),
 }
 
 
 def print_extrinsics(result: ExtrinsicsRun) -> None:
     """Print the parameters, the lines for a navigation configuration, and the findings."""
-    from strapdown.cli.console import console, print_blocks, print_findings
     from strapdown.report.extrinsics import headline, navigation_lines, table
     from strapdown.report.values import spaced
 

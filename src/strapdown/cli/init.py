@@ -7,23 +7,13 @@ import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from strapdown.cli.shared_options import (
-    SENSOR,
-    FixFlags,
-    LogFlags,
-    Quiet,
-    Verbose,
-    fix_keys,
-    log_keys,
-    running,
-    spread,
-    with_what,
-    writing,
-)
+from strapdown.cli import shared_options as options
+from strapdown.cli.console import console, print_findings, progress
+from strapdown.cli.result_folder import refuse_result
 from strapdown.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -48,11 +38,11 @@ app = typer.Typer(
 )
 
 
-def _file_to_write(name: str) -> Any:
-    return writing("FILE", f"File to write ({name}).", show_default=False)
+def _file_to_write(name: str, default: Path | None = None) -> Any:
+    return options.writing("FILE", f"File to write ({name}).", default=default)
 
 
-Force = Annotated[bool, writing(None, "Overwrite an existing file.", "--force")]
+FORCE = options.writing(None, "Overwrite an existing file.", "--force", default=False)
 
 
 @app.callback(epilog=EPILOG)
@@ -62,19 +52,16 @@ def init() -> None:
 
 @app.command("crash", epilog=CRASH_EPILOG)
 def crash(
-    records: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RECORD",
-            help="Records of one crash: CSV or text tables of any layout, tables of an event data "
-            "recorder, the folder of a test (NHTSA, ISO MME).",
-            show_default=False,
-        ),
-    ],
-    out: Annotated[Path, _file_to_write("case.toml")] = Path("case.toml"),
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    records: list[Path] = typer.Argument(
+        metavar="RECORD",
+        help="Records of one crash: CSV or text tables of any layout, tables of an event data "
+        "recorder, the folder of a test (NHTSA, ISO MME).",
+        show_default=False,
+    ),
+    out: Path = _file_to_write("case.toml", default=Path("case.toml")),
+    force: bool = FORCE,
+    quiet: bool = options.QUIET,
+    verbose: bool = options.VERBOSE,
 ) -> None:
     """Propose the case file of a crash from its records, with questions for missing data.
 
@@ -93,20 +80,17 @@ def crash(
 
 
 @app.command("align", epilog=ALIGN_EPILOG)
-@spread
+@options.spread
 def align(
-    log: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
-        ),
-    ],
+    log: Path = typer.Argument(
+        metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
+    ),
     *,
-    flags: LogFlags,
-    out: Annotated[Path, _file_to_write("align.toml")] = Path("align.toml"),
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    flags: options.LogFlags,
+    out: Path = _file_to_write("align.toml", default=Path("align.toml")),
+    force: bool = FORCE,
+    quiet: bool = options.QUIET,
+    verbose: bool = options.VERBOSE,
 ) -> None:
     """Propose the configuration of an alignment from a log, with questions for missing data.
 
@@ -121,33 +105,28 @@ def align(
 
 
 @app.command("navigate", epilog=NAVIGATE_EPILOG)
-@spread
+@options.spread
 def navigate(
-    log: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
-        ),
-    ],
-    beside: Annotated[
-        Path | None,
-        typer.Argument(metavar="[FIXES]", help="As --gnss.", show_default=False),
-    ] = None,
-    gnss: Annotated[Path | None, with_what("FIXES", "Fixes of a satellite receiver.")] = None,
-    sensor: Annotated[
-        str | None,
-        with_what("NAME|FILE", f"{SENSOR[:-1]}; the nearest by noise, if not given."),
-    ] = None,
-    foot: Annotated[
-        bool, running(None, "Foot-mounted unit: zero velocity at each stance.", "--foot")
-    ] = False,
+    log: Path = typer.Argument(
+        metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
+    ),
+    beside: Path | None = typer.Argument(
+        None, metavar="[FIXES]", help="As --gnss.", show_default=False
+    ),
+    gnss: Path | None = options.with_what("FIXES", "Fixes of a satellite receiver."),
+    sensor: str | None = options.with_what(
+        "NAME|FILE", f"{options.SENSOR[:-1]}; the nearest by noise, if not given."
+    ),
+    foot: bool = options.running(
+        None, "Foot-mounted unit: zero velocity at each stance.", "--foot", default=False
+    ),
     *,
-    flags: LogFlags,
-    fixes: FixFlags,
-    out: Annotated[Path, _file_to_write("navigate.toml")] = Path("navigate.toml"),
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    flags: options.LogFlags,
+    fixes: options.FixFlags,
+    out: Path = _file_to_write("navigate.toml", default=Path("navigate.toml")),
+    force: bool = FORCE,
+    quiet: bool = options.QUIET,
+    verbose: bool = options.VERBOSE,
 ) -> None:
     """Propose the configuration of a navigation run from log and fixes.
 
@@ -161,7 +140,7 @@ def navigate(
         raise ConfigError("cli.fixes-twice", quantity="--gnss", files=[str(gnss), str(beside)])
 
     def draft(folder: Path, report: Progress) -> Any:
-        keys = fix_keys(fixes.given(), gnss or beside)
+        keys = options.fix_keys(fixes.given(), gnss or beside)
         receiver = specify(FixesTable, **{"path": str(log), **keys}) if keys else None
         proposed = draft_navigation(
             _table(log, flags),
@@ -178,11 +157,11 @@ def navigate(
     _propose("navigate", [log], draft, question, out, force=force, quiet=quiet)
 
 
-def _table(log: Path, flags: LogFlags) -> LogTable:
+def _table(log: Path, flags: options.LogFlags) -> LogTable:
     from strapdown.config.logs import LogTable
     from strapdown.config.spec import specify
 
-    return specify(LogTable, path=str(log), **log_keys(flags.given()))
+    return specify(LogTable, path=str(log), **options.log_keys(flags.given()))
 
 
 def _propose(
@@ -201,9 +180,6 @@ def _propose(
     vehicle. `question`: above what the user is to confirm, with braces for the file; no list if
     empty.
     """
-    from strapdown.cli.console import console, print_findings, progress
-    from strapdown.cli.result_folder import refuse_result
-
     usual = "case.toml" if command == "crash" else f"{command}.toml"
     if out.is_dir() or command != "crash":
         _check_free(out, usual, force=force)

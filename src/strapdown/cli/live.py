@@ -7,17 +7,19 @@ import shlex
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+from strapdown.cli.console import print_table, tell
 from strapdown.cli.shared_options import (
-    Quiet,
+    QUIET,
     folder_to_make,
     running,
     spread,
     with_what,
 )
+from strapdown.errors import ConfigError, Finding
 
 if TYPE_CHECKING:
     from strapdown.live.hub import Hub
@@ -36,100 +38,65 @@ EVERY = 0.1
 class SourceFlags:
     """Where samples come from."""
 
-    listen: Annotated[
-        str | None,
-        with_what(
-            "HOST:PORT",
-            "Let phones send by HTTP or WebSocket: Sensor Logger. 127.0.0.1, any port, if no "
-            "source is given; 0.0.0.0:8437 for phones in your network.",
-        ),
-    ] = None
-    phyphox: Annotated[
-        list[str] | None,
-        with_what("HOST:PORT", "Ask a phone with phyphox and remote access, repeatable."),
-    ] = None
-    udp: Annotated[
-        list[str] | None,
-        with_what("HOST:PORT", "Lines in datagrams: ours, or of Sensorstream; repeatable."),
-    ] = None
-    serial: Annotated[
-        list[str] | None,
-        with_what(
-            "PORT@BAUD", "Lines of a serial port, or rows under a header; repeatable (115200)."
-        ),
-    ] = None
-    mqtt: Annotated[
-        list[str] | None,
-        with_what(
-            "URL", "Sensor Logger by a broker: mqtt://HOST/TOPIC, mqtts, ws, wss; repeatable."
-        ),
-    ] = None
-    mqtt_user: Annotated[
-        str | None,
-        with_what("NAME", f"User of the broker; the password is in {PASSWORD}."),
-    ] = None
-    token: Annotated[
-        str | None,
-        with_what(
-            "WORD",
-            "Last part of the address for phones, at least 16 letters and digits; and of commands "
-            "in datagrams. By default one is drawn.",
-        ),
-    ] = None
-    platform: Annotated[
-        str,
-        with_what(
-            "auto|android|ios",
-            "Sign of the accelerations of Sensor Logger: ios without its setting Standardise "
-            "Units & Frames (auto).",
-            show_default=False,
-        ),
-    ] = "auto"
+    listen: str | None = with_what(
+        "HOST:PORT",
+        "Let phones send by HTTP or WebSocket: Sensor Logger. 127.0.0.1, any port, if no "
+        "source is given; 0.0.0.0:8437 for phones in your network.",
+    )
+    phyphox: list[str] | None = with_what(
+        "HOST:PORT", "Ask a phone with phyphox and remote access, repeatable."
+    )
+    udp: list[str] | None = with_what(
+        "HOST:PORT", "Lines in datagrams: ours, or of Sensorstream; repeatable."
+    )
+    serial: list[str] | None = with_what(
+        "PORT@BAUD", "Lines of a serial port, or rows under a header; repeatable (115200)."
+    )
+    mqtt: list[str] | None = with_what(
+        "URL", "Sensor Logger by a broker: mqtt://HOST/TOPIC, mqtts, ws, wss; repeatable."
+    )
+    mqtt_user: str | None = with_what("NAME", f"User of the broker; the password is in {PASSWORD}.")
+    token: str | None = with_what(
+        "WORD",
+        "Last part of the address for phones, at least 16 letters and digits; and of commands "
+        "in datagrams. By default one is drawn.",
+    )
+    platform: str = with_what(
+        "auto|android|ios",
+        "Sign of the accelerations of Sensor Logger: ios without its setting Standardise "
+        "Units & Frames (auto).",
+        default="auto",
+    )
 
 
 @spread
 def live(
-    config: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="CONFIG.toml",
-            help="The file of a run of navigation; without it the attitude by a filter.",
-            show_default=False,
-        ),
-    ] = None,
+    config: Path | None = typer.Argument(
+        None,
+        metavar="CONFIG.toml",
+        help="The file of a run of navigation; without it the attitude by a filter.",
+        show_default=False,
+    ),
     *,
     sources: SourceFlags,
-    algorithm: Annotated[
-        str,
-        running(
-            "NAME", "Filter of the attitude, with its options (error-state).", show_default=False
-        ),
-    ] = "error-state",
-    every: Annotated[
-        float,
-        running("S", "Least interval between states; 0: each sample (0.1).", show_default=False),
-    ] = EVERY,
-    lines: Annotated[
-        str, running("json|csv", "States as lines of this form (json).", show_default=False)
-    ] = "json",
-    reorder: Annotated[
-        float,
-        running("S", "Wait so long for samples that others overtook (0).", show_default=False),
-    ] = 0.0,
-    stop_after: Annotated[
-        float | None, running("S", "End after so long; otherwise at Ctrl-C.")
-    ] = None,
-    qr: Annotated[
-        bool | None,
-        running(
-            None,
-            "Show the address as a QR code; by default on a terminal, if phones can reach it.",
-            "--qr/--no-qr",
-            show_default=False,
-        ),
-    ] = None,
-    out: Annotated[Path | None, folder_to_make("live, a folder in it for each device")] = None,
-    quiet: Quiet = False,
+    algorithm: str = running(
+        "NAME", "Filter of the attitude, with its options (error-state).", default="error-state"
+    ),
+    every: float = running(
+        "S", "Least interval between states; 0: each sample (0.1).", default=EVERY
+    ),
+    lines: str = running("json|csv", "States as lines of this form (json).", default="json"),
+    reorder: float = running(
+        "S", "Wait so long for samples that others overtook (0).", default=0.0
+    ),
+    stop_after: float | None = running("S", "End after so long; otherwise at Ctrl-C."),
+    qr: bool | None = running(
+        None,
+        "Show the address as a QR code; by default on a terminal, if phones can reach it.",
+        "--qr/--no-qr",
+    ),
+    out: Path | None = folder_to_make("live, a folder in it for each device"),
+    quiet: bool = QUIET,
 ) -> None:
     """Receive phones and sensors as they send, and show their attitude or navigation.
 
@@ -137,11 +104,9 @@ def live(
     used, which every other command reads as a log. States are written to standard output, one a
     line, all else to standard error.
     """
-    from strapdown.cli.console import tell
     from strapdown.cli.live_folder import warner
     from strapdown.cli.navigate_live import line_writer
     from strapdown.config.navigation import NavigationSpec
-    from strapdown.errors import ConfigError, Finding
     from strapdown.live.hub import StateWriter
     from strapdown.live.many import LiveSources, receive_many
     from strapdown.live.replay import MachineClock
@@ -188,8 +153,6 @@ def live(
 
 def show_qr(address: str) -> None:
     """Show an address as a QR code on standard error."""
-    from strapdown.errors import ConfigError
-
     try:
         import segno
     except ImportError:
@@ -207,8 +170,6 @@ def _print_sessions(hub: Hub, command: str) -> None:
     `command`: makes the sealed result of a session, which is a log.
     """
     from contextlib import redirect_stdout
-
-    from strapdown.cli.console import print_table
 
     rows = []
     for told in hub.ended:

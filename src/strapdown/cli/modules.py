@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import typer
 
-from strapdown.cli.shared_options import Json
+from strapdown.cli.console import console, print_findings, print_table
+from strapdown.cli.shared_options import JSON
 
 EPILOG = "Example: strapdown modules\n\nExample: strapdown modules --json"
 
 
-def modules(json: Json = False) -> None:
+def modules(json: bool = JSON) -> None:
     """List the modules of each slot: algorithms, pipeline modules, sensors, formats."""
     from strapdown.bundle import to_json
-    from strapdown.cli.console import console, print_findings, print_table
     from strapdown.cli.modules_list import HEADINGS, cell_text, listed_modules
 
     lists, findings = listed_modules()

@@ -5,20 +5,28 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+from strapdown.cli.console import WORDS
+from strapdown.cli.result_folder import (
+    claim,
+    folder_to_write,
+    refuse_result,
+    run_and_save,
+    source_name,
+)
 from strapdown.cli.shared_options import (
+    HEIGHT,
     LOG_FLAGS,
+    LONGITUDE,
+    RECOVER,
+    SENSOR_MODEL,
+    TOKEN,
     FixFlags,
-    Height,
     LogFlags,
-    Longitude,
-    Recover,
     ReportFlags,
-    Sensor,
-    Token,
     as_flag,
     fix_flags,
     fix_keys,
@@ -67,101 +75,68 @@ FLAGS = {
 class NavigateFlags:
     """Measurements, start and mode of a navigation run."""
 
-    gnss: Annotated[Path | None, with_what("FIXES", "Fixes of a satellite receiver.")] = None
-    lever_arm: Annotated[
-        str | None,
-        with_what("X,Y,Z", "Of its antenna from the sensors, forward, right, down, m (0,0,0)."),
-    ] = None
-    sensor: Sensor = None
-    lat: Annotated[float | None, with_what("DEG", "Latitude at the start, without fixes.")] = None
-    lon: Longitude = None
-    alt: Height = None
-    heading: Annotated[
-        float | None,
-        with_what("DEG", "Initial heading, if neither gyros nor course determine it."),
-    ] = None
-    truth: Annotated[
-        Path | None, with_what("FILE", "A trajectory to compare with, before that of a file.")
-    ] = None
-    points: Annotated[
-        Path | None,
-        with_what(
-            "FILE",
-            "Control points (time, north, east) to score the path by, after the origin and "
-            "heading that fit best.",
-        ),
-    ] = None
-    map: Annotated[
-        Path | None,
-        with_what(
-            "FILE",
-            "A local map under the plan of the report: raster tiles, .mbtiles or .pmtiles. "
-            "Nothing is fetched.",
-        ),
-    ] = None
-    smooth: Annotated[
-        bool,
-        running(
-            None,
-            "Smooth the run: estimate every state from all measurements (RTS).",
-            "--smooth",
-        ),
-    ] = False
-    pace: Annotated[
-        str | None,
-        running(
-            "N|max",
-            "Replay the record sample by sample, N times as fast as recorded, and report "
-            "the latency of each sample.",
-        ),
-    ] = None
-    live: Annotated[
-        str | None,
-        running(
-            "-|udp://HOST:PORT",
-            "Take samples as they come, as lines of standard input or of datagrams, by the "
-            "file of a run.",
-        ),
-    ] = None
-    every: Annotated[
-        float | None,
-        running("S", "With --live: a line of the state so often (1).", show_default=False),
-    ] = None
-    lines: Annotated[
-        str | None, running("json|csv", "With --live: as what (json).", show_default=False)
-    ] = None
-    token: Token = None
-    recover: Recover = None
+    gnss: Path | None = with_what("FIXES", "Fixes of a satellite receiver.")
+    lever_arm: str | None = with_what(
+        "X,Y,Z", "Of its antenna from the sensors, forward, right, down, m (0,0,0)."
+    )
+    sensor: str | None = SENSOR_MODEL
+    lat: float | None = with_what("DEG", "Latitude at the start, without fixes.")
+    lon: float | None = LONGITUDE
+    alt: float | None = HEIGHT
+    heading: float | None = with_what(
+        "DEG", "Initial heading, if neither gyros nor course determine it."
+    )
+    truth: Path | None = with_what("FILE", "A trajectory to compare with, before that of a file.")
+    points: Path | None = with_what(
+        "FILE",
+        "Control points (time, north, east) to score the path by, after the origin and "
+        "heading that fit best.",
+    )
+    map: Path | None = with_what(
+        "FILE",
+        "A local map under the plan of the report: raster tiles, .mbtiles or .pmtiles. "
+        "Nothing is fetched.",
+    )
+    smooth: bool = running(
+        None,
+        "Smooth the run: estimate every state from all measurements (RTS).",
+        "--smooth",
+        default=False,
+    )
+    pace: str | None = running(
+        "N|max",
+        "Replay the record sample by sample, N times as fast as recorded, and report "
+        "the latency of each sample.",
+    )
+    live: str | None = running(
+        "-|udp://HOST:PORT",
+        "Take samples as they come, as lines of standard input or of datagrams, by the "
+        "file of a run.",
+    )
+    every: float | None = running("S", "With --live: a line of the state so often (1).")
+    lines: str | None = running("json|csv", "With --live: as what (json).")
+    token: str | None = TOKEN
+    recover: Path | None = RECOVER
 
 
 @spread
 def navigate(
-    source: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="LOG|CONFIG.toml",
-            help="A log of gyros and accelerometers, a session of strapdown live, or the file of "
-            "a run of navigation.",
-            show_default=False,
-        ),
-    ] = None,
+    source: Path | None = typer.Argument(
+        None,
+        metavar="LOG|CONFIG.toml",
+        help="A log of gyros and accelerometers, a session of strapdown live, or the file of "
+        "a run of navigation.",
+        show_default=False,
+    ),
     *,
     flags: NavigateFlags,
     log: LogFlags,
     fixes: FixFlags,
-    out: Annotated[Path | None, folder_to_make("LOG-navigate")] = None,
+    out: Path | None = folder_to_make("LOG-navigate"),
     write: ReportFlags,
 ) -> None:
     """Find position, velocity and attitude over a record, by inertial sensors and measurements."""
     from strapdown.bundle import write_latency
-    from strapdown.cli.console import WORDS
-    from strapdown.cli.result_folder import (
-        claim,
-        folder_to_write,
-        refuse_result,
-        run_and_save,
-        source_name,
-    )
     from strapdown.config.navigation import NavigationSpec
     from strapdown.systems.navigation_run import run_navigation
 

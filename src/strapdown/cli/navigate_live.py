@@ -10,18 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapdown.bundle import Seal, write_latency, write_timing
+from strapdown.cli import live_folder
 from strapdown.cli.console import Stopwatch, print_seal, progress
-from strapdown.cli.live_folder import (
-    begin_journal,
-    open_lines,
-    output_of,
-    recovered,
-    refuse_beside_recover,
-    remove_empty,
-    remove_received,
-    sealing,
-    warner,
-)
 from strapdown.cli.navigate_tables import print_latency, print_navigation
 from strapdown.cli.shared_options import ReportFlags
 from strapdown.config.navigation import NavigationSpec
@@ -66,7 +56,7 @@ def navigate_live(
         "every": EVERY if flags.every is None else flags.every,
         "lines": LINES if flags.lines is None else flags.lines,
     }
-    _run(begin_journal(folder, COMMAND, run), spec, file, folder, write, flags)
+    _run(live_folder.begin_journal(folder, COMMAND, run), spec, file, folder, write, flags)
 
 
 def recover_navigation(
@@ -76,11 +66,11 @@ def recover_navigation(
 
     `out`, `given`: as of `navigate_live`; by default the bundle that the killed run was to write.
     """
-    refuse_beside_recover(given)
+    live_folder.refuse_beside_recover(given)
     assert flags.recover is not None
-    journal = recovered(flags.recover, COMMAND, warner(write.quiet))
-    with sealing(journal):
-        folder = output_of(journal, out, write.force)
+    journal = live_folder.recovered(flags.recover, COMMAND, live_folder.warner(write.quiet))
+    with live_folder.sealing(journal):
+        folder = live_folder.output_of(journal, out, write.force)
         spec = NavigationSpec.checked(journal.run["configuration"])
         file = _file(journal)
     _run(journal, spec, file, folder, write, flags)
@@ -126,9 +116,9 @@ def _run(
     flags: NavigateFlags,
 ) -> None:
     """Navigate what the journal has, and what comes; and write the bundle."""
-    clock, warn, run = MachineClock(), warner(write.quiet), journal.run
-    with sealing(journal):
-        source = open_lines(flags.live, clock, flags.token, warn)
+    clock, warn, run = MachineClock(), live_folder.warner(write.quiet), journal.run
+    with live_folder.sealing(journal):
+        source = live_folder.open_lines(flags.live, clock, flags.token, warn)
         lines = run["lines"] if flags.lines is None else flags.lines
         every = run["every"] if flags.every is None else flags.every
         live = receive(spec, source, clock, line_writer, warn, lines, every, journal)
@@ -136,8 +126,8 @@ def _run(
             if live.got.count:
                 seal = _sealed(live, journal, file, folder, write)
     if not live.got.count:
-        remove_empty(journal, source is not None)
-    remove_received(journal, seal.path)
+        live_folder.remove_empty(journal, source is not None)
+    live_folder.remove_received(journal, seal.path)
     with redirect_stdout(sys.stderr):
         if not write.quiet and live.latency is not None:
             print_latency(live.latency, flags.live or "")

@@ -6,10 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+from strapdown.cli.console import WORDS, console, print_blocks, print_findings
+from strapdown.cli.result_folder import folder_to_write, run_and_save, source_name
 from strapdown.cli.shared_options import (
     BEGIN,
     END,
@@ -43,68 +45,50 @@ during = partial(option, "Instants, for a navigation run")
 class MotionFlags:
     """Motion of a sensor, by key of its table."""
 
-    speed_m_per_s: Annotated[float | None, moving("M/S", "Speed (0: stationary).", "--speed")] = (
-        None
+    speed_m_per_s: float | None = moving("M/S", "Speed (0: stationary).", "--speed")
+    to_speed_m_per_s: float | None = moving("M/S", "Speed at the end of the outage.", "--to-speed")
+    turn_rate_deg_per_s: float | None = moving(
+        "DEG/S", "Turn rate, positive to the right.", "--turn-rate"
     )
-    to_speed_m_per_s: Annotated[
-        float | None, moving("M/S", "Speed at the end of the outage.", "--to-speed")
-    ] = None
-    turn_rate_deg_per_s: Annotated[
-        float | None, moving("DEG/S", "Turn rate, positive to the right.", "--turn-rate")
-    ] = None
-    heading_deg: Annotated[float | None, moving("DEG", "Heading (45).", "--heading")] = None
-    lat_deg: Annotated[float | None, moving("DEG", "Latitude (45).", "--lat")] = None
+    heading_deg: float | None = moving("DEG", "Heading (45).", "--heading")
+    lat_deg: float | None = moving("DEG", "Latitude (45).", "--lat")
 
 
 @dataclass(frozen=True)
 class StartFlags:
     """Initial standard deviations, by key of the table."""
 
-    aided_s: Annotated[
-        float | None,
-        starting(
-            "S",
-            "Duration of the drive with fixes before the outage (600); 0: after an alignment.",
-            "--aided",
-        ),
-    ] = None
-    fix_position_sd_m: Annotated[
-        float | None, starting("M", "Of these fixes, at 1 Hz (1.5).", "--fix-sd")
-    ] = None
-    position_sd_m: Annotated[
-        float | None,
-        starting(
-            "M", "Position, each axis, instead of that after the drive; so below.", "--position-sd"
-        ),
-    ] = None
-    velocity_sd_m_per_s: Annotated[
-        float | None, starting("M/S", "Velocity, each axis.", "--velocity-sd")
-    ] = None
-    tilt_sd_deg: Annotated[float | None, starting("DEG", "Roll and pitch.", "--tilt-sd")] = None
-    heading_sd_deg: Annotated[float | None, starting("DEG", "Heading.", "--heading-sd")] = None
-    gyro_bias_sd_deg_per_h: Annotated[
-        float | None, starting("DEG/H", "Gyro biases after alignment or aiding.", "--gyro-bias-sd")
-    ] = None
-    accel_bias_sd_ug: Annotated[
-        float | None,
-        starting("UG", "Accelerometer biases after alignment or aiding, µg.", "--accel-bias-sd"),
-    ] = None
+    aided_s: float | None = starting(
+        "S",
+        "Duration of the drive with fixes before the outage (600); 0: after an alignment.",
+        "--aided",
+    )
+    fix_position_sd_m: float | None = starting("M", "Of these fixes, at 1 Hz (1.5).", "--fix-sd")
+    position_sd_m: float | None = starting(
+        "M", "Position, each axis, instead of that after the drive; so below.", "--position-sd"
+    )
+    velocity_sd_m_per_s: float | None = starting("M/S", "Velocity, each axis.", "--velocity-sd")
+    tilt_sd_deg: float | None = starting("DEG", "Roll and pitch.", "--tilt-sd")
+    heading_sd_deg: float | None = starting("DEG", "Heading.", "--heading-sd")
+    gyro_bias_sd_deg_per_h: float | None = starting(
+        "DEG/H", "Gyro biases after alignment or aiding.", "--gyro-bias-sd"
+    )
+    accel_bias_sd_ug: float | None = starting(
+        "UG", "Accelerometer biases after alignment or aiding, µg.", "--accel-bias-sd"
+    )
 
 
 @dataclass(frozen=True)
 class OutageFlags:
     """Outages of a navigation run, by key of its table."""
 
-    at_s: Annotated[
-        float | None,
-        during("S", "Begin of the outage, a stamp of the log; evenly spaced if not given.", "--at"),
-    ] = None
-    places: Annotated[int | None, during("N", "Number of evenly spaced outages (10).")] = None
-    from_s: Annotated[
-        float | None, during("S", BEGIN.format("where the filter has settled"), "--from")
-    ] = None
-    to_s: Annotated[float | None, during("S", END, "--to")] = None
-    duration_s: Annotated[float | None, during("S", LENGTH, "--duration")] = None
+    at_s: float | None = during(
+        "S", "Begin of the outage, a stamp of the log; evenly spaced if not given.", "--at"
+    )
+    places: int | None = during("N", "Number of evenly spaced outages (10).")
+    from_s: float | None = during("S", BEGIN.format("where the filter has settled"), "--from")
+    to_s: float | None = during("S", END, "--to")
+    duration_s: float | None = during("S", LENGTH, "--duration")
 
 
 #: Flags by key path of the specification.
@@ -119,32 +103,24 @@ FLAGS = {
 
 @spread
 def outage(
-    source: Annotated[
-        str,
-        typer.Argument(
-            metavar="SENSOR|BUNDLE",
-            help="A sensor of the catalogue (strapdown sensors) or a .toml file of your own; or a "
-            "folder written by strapdown navigate, or the file of such a run, whose GNSS fixes are "
-            "then withheld.",
-        ),
-    ],
+    source: str = typer.Argument(
+        metavar="SENSOR|BUNDLE",
+        help="A sensor of the catalogue (strapdown sensors) or a .toml file of your own; or a "
+        "folder written by strapdown navigate, or the file of such a run, whose GNSS fixes are "
+        "then withheld.",
+    ),
     *,
-    outage: Annotated[
-        float, running("S", "Duration of the outage (60).", show_default=False)
-    ] = 60.0,
+    outage: float = running("S", "Duration of the outage (60).", default=60.0),
     motion: MotionFlags,
-    keep: Annotated[
-        list[str] | None,
-        moving(
-            "KIND",
-            "A measurement that remains, with options after a colon: no_slip, odometer, "
-            "zero_velocity, zero_rate:sd_deg_per_s=0.1; repeatable.",
-            "--with",
-        ),
-    ] = None,
+    keep: list[str] | None = moving(
+        "KIND",
+        "A measurement that remains, with options after a colon: no_slip, odometer, "
+        "zero_velocity, zero_rate:sd_deg_per_s=0.1; repeatable.",
+        "--with",
+    ),
     start: StartFlags,
     run: OutageFlags,
-    out: Annotated[Path | None, folder_to_make("SENSOR-outage, or DRIVE-outage")] = None,
+    out: Path | None = folder_to_make("SENSOR-outage, or DRIVE-outage"),
     write: ReportFlags,
 ) -> None:
     """Predict the drift during a GNSS outage, and the sources of the drift.
@@ -152,8 +128,6 @@ def outage(
     For a sensor the prediction uses its data sheet and a stated motion. For a navigation run it
     uses the filter's own state, and compares the prediction with the measured drifts.
     """
-    from strapdown.cli.console import WORDS
-    from strapdown.cli.result_folder import folder_to_write, run_and_save, source_name
     from strapdown.report.outage import read_run_of_outage
     from strapdown.systems.inputs import check_part
     from strapdown.systems.outage_run import run_outage
@@ -237,7 +211,6 @@ def _with(place: str) -> str:
 
 def print_outage(result: OutageRun) -> None:
     """Print the predicted drift, its sources, the measured drifts, and the findings."""
-    from strapdown.cli.console import console, print_blocks, print_findings
     from strapdown.report import outage_document as words
     from strapdown.report.outage_document import budget_table, drift_table, time_table
     from strapdown.report.values import spaced

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+from strapdown.cli.console import console, print_blocks, print_findings
+from strapdown.cli.console import progress as bar
+from strapdown.cli.result_folder import run_and_save
 from strapdown.cli.shared_options import ReportFlags, as_flag, running, spread, writing
 from strapdown.errors import ConfigError
 
@@ -23,21 +26,15 @@ FLAGS = {"outage_s": "--outage", "speed_m_per_s": "--speed", "sensor": "NAME|FIL
 
 @spread
 def sensors(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="[NAME|FILE]...",
-            help="Sensors of the catalogue, or files of your own, as of strapdown allan.",
-        ),
-    ] = None,
+    names: list[str] | None = typer.Argument(
+        None,
+        metavar="[NAME|FILE]...",
+        help="Sensors of the catalogue, or files of your own, as of strapdown allan.",
+    ),
     *,
-    outage: Annotated[
-        float, running("S", "Duration of the outage (60).", show_default=False)
-    ] = 60.0,
-    speed: Annotated[float, running("M/S", "Speed (0: stationary).", show_default=False)] = 15.0,
-    out: Annotated[
-        Path | None, writing("DIR", "Write a page and the data into this folder.")
-    ] = None,
+    outage: float = running("S", "Duration of the outage (60).", default=60.0),
+    speed: float = running("M/S", "Speed (0: stationary).", default=15.0),
+    out: Path | None = writing("DIR", "Write a page and the data into this folder."),
     write: ReportFlags,
 ) -> None:
     """List the sensors of the catalogue, show one with its sources, or compare several.
@@ -46,8 +43,6 @@ def sensors(
     in an outage (standard deviations against time).
     """
     from strapdown.bundle import to_json
-    from strapdown.cli.console import print_findings
-    from strapdown.cli.result_folder import run_and_save
     from strapdown.config.outage import SensorsSpec
     from strapdown.config.spec import specify
     from strapdown.report import sensors as report
@@ -89,7 +84,6 @@ def sensors(
     if out is not None:
         run_and_save(compute, out, write, "sensors.json", show)
         return
-    from strapdown.cli.console import progress as bar
 
     with bar(write.quiet or write.json) as reported:
         run = compute(reported)
@@ -100,7 +94,6 @@ def sensors(
 
 
 def _print(block: Any) -> None:
-    from strapdown.cli.console import console, print_blocks
     from strapdown.report.values import spaced
 
     if block.title:

@@ -12,16 +12,22 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import partial, wraps
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Any, get_type_hints
 
 import typer
 
 from strapdown.errors import ConfigError
 
 
-def option(panel: str, metavar: str | None, text: str, *flags: str, **more: Any) -> Any:
-    """Return an option; the help lists those of a panel together."""
-    return typer.Option(*flags, metavar=metavar, help=text, rich_help_panel=panel, **more)
+def option(
+    panel: str, metavar: str | None, text: str, *flags: str, default: Any = None, **more: Any
+) -> Any:
+    """Return an option, the default of its parameter; the help lists those of a panel together.
+
+    The text says the default, in its own words.
+    """
+    more |= {"metavar": metavar, "help": text, "rich_help_panel": panel, "show_default": False}
+    return typer.Option(default, *flags, **more)
 
 
 reading = partial(option, "How to read the log")
@@ -37,90 +43,63 @@ SENSOR = (
     "your own."
 )
 
-Sensor = Annotated[str | None, with_what("NAME|FILE", SENSOR)]
-Longitude = Annotated[float | None, with_what("DEG", "Longitude, east positive.")]
-Height = Annotated[float | None, with_what("M", "Height over the ellipsoid (0).")]
-Token = Annotated[
-    str | None,
-    running(
-        "WORD",
-        "With --live udp://…: what a command in a datagram must carry, command,WORD,TOKEN; "
-        "by default one is drawn and shown.",
-    ),
-]
-Recover = Annotated[
-    Path | None,
-    running(
-        "DIR",
-        "Finish a --live run that was killed, from the folder OUT-received that it left; "
-        "with --live, continue it.",
-    ),
-]
+SENSOR_MODEL = with_what("NAME|FILE", SENSOR)
+LONGITUDE = with_what("DEG", "Longitude, east positive.")
+HEIGHT = with_what("M", "Height over the ellipsoid (0).")
+TOKEN = running(
+    "WORD",
+    "With --live udp://…: what a command in a datagram must carry, command,WORD,TOKEN; "
+    "by default one is drawn and shown.",
+)
+RECOVER = running(
+    "DIR",
+    "Finish a --live run that was killed, from the folder OUT-received that it left; "
+    "with --live, continue it.",
+)
 
 
 @dataclass(frozen=True)
 class LogFlags:
     """Part of a log to use, and how to read it."""
 
-    from_s: Annotated[float | None, reading("S", BEGIN.format("the first"), "--from")] = None
-    to_s: Annotated[float | None, reading("S", END, "--to")] = None
-    duration: Annotated[float | None, reading("S", LENGTH, "--duration")] = None
-    rate: Annotated[
-        float | None, reading("HZ", "Sample rate in Hz, for logs without a time column.")
-    ] = None
-    sampling: Annotated[
-        str | None,
-        reading(
-            "KIND",
-            "instantaneous (the rate at the stamp) or mean (over the interval that ends there).",
-        ),
-    ] = None
-    format: Annotated[
-        str | None, reading("FORMAT", "Format of the log (strapdown modules), if it is not found.")
-    ] = None
-    columns: Annotated[
-        list[str] | None,
-        reading(
-            "Q=NAME",
-            "time=t,gyro_x=wx,… ; a number counts columns from 1; -NAME reverses one; gyro=NAME "
-            "for an array of three.",
-        ),
-    ] = None
-    gyro_unit: Annotated[
-        str | None,
-        reading("UNIT", "rad/s, deg/s, …; of raw counts deg/s/131; rad, deg: increments."),
-    ] = None
-    accel_unit: Annotated[
-        str | None,
-        reading(
-            "UNIT",
-            "m/s2, g, mg; -g or -m/s2 for the other sign (iOS); of raw counts g/16384; m/s: "
-            "increments.",
-        ),
-    ] = None
-    time_unit: Annotated[str | None, reading("UNIT", "s, ms, us, ns.")] = None
-    axes: Annotated[
-        str | None,
-        reading(
-            "X,Y,Z",
-            "Sensor axes that point forward, right, down: 'x,-y,-z'; or where x, y, z point: "
-            "forward-left-up.",
-        ),
-    ] = None
-    repair: Annotated[
-        bool,
-        reading(
-            None,
-            "Drop rows that cannot be used, unwrap the clock, and report both.",
-            "--repair",
-        ),
-    ] = False
-    calibration: Annotated[
-        Path | None,
-        reading(
-            "FILE.toml", "Take off the errors that strapdown calibrate found, of the same sensor."
-        ),
-    ] = None
+    from_s: float | None = reading("S", BEGIN.format("the first"), "--from")
+    to_s: float | None = reading("S", END, "--to")
+    duration: float | None = reading("S", LENGTH, "--duration")
+    rate: float | None = reading("HZ", "Sample rate in Hz, for logs without a time column.")
+    sampling: str | None = reading(
+        "KIND", "instantaneous (the rate at the stamp) or mean (over the interval that ends there)."
+    )
+    format: str | None = reading(
+        "FORMAT", "Format of the log (strapdown modules), if it is not found."
+    )
+    columns: list[str] | None = reading(
+        "Q=NAME",
+        "time=t,gyro_x=wx,… ; a number counts columns from 1; -NAME reverses one; gyro=NAME "
+        "for an array of three.",
+    )
+    gyro_unit: str | None = reading(
+        "UNIT", "rad/s, deg/s, …; of raw counts deg/s/131; rad, deg: increments."
+    )
+    accel_unit: str | None = reading(
+        "UNIT",
+        "m/s2, g, mg; -g or -m/s2 for the other sign (iOS); of raw counts g/16384; m/s: "
+        "increments.",
+    )
+    time_unit: str | None = reading("UNIT", "s, ms, us, ns.")
+    axes: str | None = reading(
+        "X,Y,Z",
+        "Sensor axes that point forward, right, down: 'x,-y,-z'; or where x, y, z point: "
+        "forward-left-up.",
+    )
+    repair: bool = reading(
+        None,
+        "Drop rows that cannot be used, unwrap the clock, and report both.",
+        "--repair",
+        default=False,
+    )
+    calibration: Path | None = reading(
+        "FILE.toml", "Take off the errors that strapdown calibrate found, of the same sensor."
+    )
 
     def given(self) -> dict[str, Any]:
         """By name of the flag, None where not given."""
@@ -131,45 +110,34 @@ class LogFlags:
 class FixFlags:
     """How to read the fixes: of their own file, or of the log that has them."""
 
-    gnss_format: Annotated[
-        str | None, fixes("FORMAT", "Format of the fixes (strapdown modules), if it is not found.")
-    ] = None
-    gnss_columns: Annotated[
-        list[str] | None,
-        fixes(
-            "Q=NAME",
-            "time=t,lat=y,lon=x,alt=h,VN=… ; a number counts columns from 1; local positions are "
-            "north, east, up, those of the Earth ecef_x, ecef_y, ecef_z.",
-        ),
-    ] = None
-    gnss_units: Annotated[
-        list[str] | None, fixes("Q=UNIT", "Units of columns: time=ms,lat=rad,alt=ft,speed=km/h.")
-    ] = None
-    gnss_datum_height: Annotated[
-        float | None,
-        fixes(
-            "M",
-            "Height over the ellipsoid of the level that heights are counted from: the geoid "
-            "(heights over the sea), or the point of take-off.",
-        ),
-    ] = None
-    gnss_origin: Annotated[
-        str | None,
-        fixes(
-            "LAT,LON,HEIGHT",
-            "Origin of local positions, or where velocities without positions begin, deg, deg, m "
-            "over the ellipsoid; or the UTM zone: 33N.",
-        ),
-    ] = None
+    gnss_format: str | None = fixes(
+        "FORMAT", "Format of the fixes (strapdown modules), if it is not found."
+    )
+    gnss_columns: list[str] | None = fixes(
+        "Q=NAME",
+        "time=t,lat=y,lon=x,alt=h,VN=… ; a number counts columns from 1; local positions are "
+        "north, east, up, those of the Earth ecef_x, ecef_y, ecef_z.",
+    )
+    gnss_units: list[str] | None = fixes(
+        "Q=UNIT", "Units of columns: time=ms,lat=rad,alt=ft,speed=km/h."
+    )
+    gnss_datum_height: float | None = fixes(
+        "M",
+        "Height over the ellipsoid of the level that heights are counted from: the geoid "
+        "(heights over the sea), or the point of take-off.",
+    )
+    gnss_origin: str | None = fixes(
+        "LAT,LON,HEIGHT",
+        "Origin of local positions, or where velocities without positions begin, deg, deg, m "
+        "over the ellipsoid; or the UTM zone: 33N.",
+    )
 
-    gnss_position_sd: Annotated[
-        float | None,
-        fixes("M", "Standard deviation of each position, in place of those of the file."),
-    ] = None
-    gnss_velocity_sd: Annotated[
-        float | None,
-        fixes("M/S", "Standard deviation of each velocity, in place of those of the file."),
-    ] = None
+    gnss_position_sd: float | None = fixes(
+        "M", "Standard deviation of each position, in place of those of the file."
+    )
+    gnss_velocity_sd: float | None = fixes(
+        "M/S", "Standard deviation of each velocity, in place of those of the file."
+    )
 
     def given(self) -> dict[str, Any]:
         """By name of the flag, None where not given."""
@@ -246,12 +214,12 @@ def log_keys(given: Mapping[str, Any]) -> dict[str, Any]:
     return keys
 
 
-def folder_to_make(name: str) -> Any:
+def folder_to_make(name: str, default: Path | None = None) -> Any:
     """The option ``--out`` of a command that creates a folder, with its default name."""
-    return writing("DIR", f"Folder to make ({name}).", show_default=False)
+    return writing("DIR", f"Folder to make ({name}).", default=default)
 
 
-Force = Annotated[bool, writing(None, "Overwrite an existing result.", "--force")]
+FORCE = writing(None, "Overwrite an existing result.", "--force", default=False)
 
 
 #: Lowest level of shown log messages, by the flag that asks for it.
@@ -265,61 +233,54 @@ def set_level(flag: typer.CallbackParam, asked: bool) -> bool:
     return asked
 
 
-Quiet = Annotated[
-    bool,
-    writing(None, "Print errors only.", "--quiet", "-q", callback=set_level),
-]
-Verbose = Annotated[
-    bool,
-    writing(
-        None,
-        "Print each stage with its duration, which reader took which file, and all tables.",
-        "--verbose",
-        "-v",
-        callback=set_level,
-    ),
-]
+QUIET = writing(None, "Print errors only.", "--quiet", "-q", callback=set_level, default=False)
+VERBOSE = writing(
+    None,
+    "Print each stage with its duration, which reader took which file, and all tables.",
+    "--verbose",
+    "-v",
+    callback=set_level,
+    default=False,
+)
 
 
-Json = Annotated[bool, writing(None, "Print the result as JSON alone.", "--json")]
+JSON = writing(None, "Print the result as JSON alone.", "--json", default=False)
 
 
 @dataclass(frozen=True)
 class WriteFlags:
     """Whether to replace an existing result, and whether to print."""
 
-    force: Force = False
-    quiet: Quiet = False
-    verbose: Verbose = False
+    force: bool = FORCE
+    quiet: bool = QUIET
+    verbose: bool = VERBOSE
 
 
 @dataclass(frozen=True)
 class OutFlags:
     """`WriteFlags` for a command that can print its result as JSON."""
 
-    force: Force = False
-    json: Json = False
-    quiet: Quiet = False
-    verbose: Verbose = False
+    force: bool = FORCE
+    json: bool = JSON
+    quiet: bool = QUIET
+    verbose: bool = VERBOSE
 
 
 @dataclass(frozen=True)
 class ReportFlags:
     """`OutFlags` for a command that writes a report."""
 
-    no_report: Annotated[
-        bool,
-        writing(
-            None,
-            "Write no page and no figures: the data, the findings and the seal alone, which "
-            "strapdown verify repeats likewise.",
-            "--no-report",
-        ),
-    ] = False
-    force: Force = False
-    json: Json = False
-    quiet: Quiet = False
-    verbose: Verbose = False
+    no_report: bool = writing(
+        None,
+        "Write no page and no figures: the data, the findings and the seal alone, which "
+        "strapdown verify repeats likewise.",
+        "--no-report",
+        default=False,
+    )
+    force: bool = FORCE
+    json: bool = JSON
+    quiet: bool = QUIET
+    verbose: bool = VERBOSE
 
 
 def spread(command: Callable[..., None]) -> Callable[..., None]:
@@ -328,7 +289,7 @@ def spread(command: Callable[..., None]) -> Callable[..., None]:
     `command`: some of its parameters are of a dataclass whose fields are options. Returns the same
     command with a parameter for each option instead of the set.
     """
-    hints = get_type_hints(command, include_extras=True)
+    hints = get_type_hints(command)
     hints.pop("return", None)
     sets: dict[str, Any] = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
     laid_out: list[inspect.Parameter] = []
@@ -336,7 +297,7 @@ def spread(command: Callable[..., None]) -> Callable[..., None]:
         if name not in sets:
             laid_out.append(parameter.replace(annotation=hints[name]))
             continue
-        options = get_type_hints(sets[name], include_extras=True)
+        options = get_type_hints(sets[name])
         laid_out += [
             parameter.replace(name=f.name, annotation=options[f.name], default=f.default)
             for f in fields(sets[name])
@@ -371,11 +332,8 @@ def fix_flags(table: str) -> dict[str, str]:
 
 def flags_by_key(options: type, table: str = "") -> dict[str, str]:
     """Flags of a set of options that are named by the keys of a table, by key path."""
-    # The first word of an annotated option is its flag.
-    own = {
-        n: h.__metadata__[0].default for n, h in get_type_hints(options, None, None, True).items()
-    }
-    return {f"{table}{n}": f if isinstance(f, str) else flag_of(n) for n, f in own.items()}
+    own: dict[str, Any] = {f.name: f.default for f in fields(options)}
+    return {f"{table}{n}": (*made.param_decls, flag_of(n))[0] for n, made in own.items()}
 
 
 def refuse_beside_file(

@@ -5,11 +5,12 @@ from __future__ import annotations
 import sys
 from functools import partial
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from strapdown.cli.shared_options import Quiet, Verbose, option
+from strapdown.cli.console import console
+from strapdown.cli.shared_options import QUIET, VERBOSE, option
+from strapdown.errors import ConfigError
 
 EPILOG = (
     "Example: strapdown sign --new-key expert.pem\n\n"
@@ -19,20 +20,12 @@ signing = partial(option, "Key")
 
 
 def sign(
-    folder: Annotated[
-        Path | None, typer.Argument(metavar="DIR", help="A folder that a run wrote.")
-    ] = None,
-    key: Annotated[
-        Path | None, signing("FILE", "Secret key by Ed25519, as PEM or of OpenSSH.")
-    ] = None,
-    new_key: Annotated[
-        Path | None, signing("FILE", "Make a key; the public part becomes FILE.pub.")
-    ] = None,
-    password: Annotated[
-        bool, signing(None, "Ask for the password of the key.", "--password")
-    ] = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    folder: Path | None = typer.Argument(None, metavar="DIR", help="A folder that a run wrote."),
+    key: Path | None = signing("FILE", "Secret key by Ed25519, as PEM or of OpenSSH."),
+    new_key: Path | None = signing("FILE", "Make a key; the public part becomes FILE.pub."),
+    password: bool = signing(None, "Ask for the password of the key.", "--password", default=False),
+    quiet: bool = QUIET,
+    verbose: bool = VERBOSE,
 ) -> None:
     """Sign the seal of a result with your key, so that others can tell that it is yours.
 
@@ -41,8 +34,6 @@ def sign(
     """
     from strapdown.bundle.signature import new_key as make_key
     from strapdown.bundle.signature import sign as sign_bundle
-    from strapdown.cli.console import console
-    from strapdown.errors import ConfigError
 
     if (folder is None) == (new_key is None) or (folder is None) != (key is None):
         raise ConfigError("cli.sign-what", quantity="DIR, --key or --new-key")

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
+from strapdown.cli.console import WORDS, console, print_seal, progress
+from strapdown.cli.result_folder import claim, folder_to_write
 from strapdown.cli.shared_options import OutFlags, folder_to_make, running, spread, writing
 
 EPILOG = "Example: strapdown simulate alexiev-fig4 --rate 100 --format all --out fig4"
@@ -15,60 +16,41 @@ EPILOG = "Example: strapdown simulate alexiev-fig4 --rate 100 --format all --out
 
 @spread
 def simulate(
-    name: Annotated[
-        str,
-        typer.Argument(
-            metavar="NAME|FILE",
-            help="A scenario or a crash (strapdown modules), or the file (.toml) of a scenario or "
-            "a trajectory, "
-            "whose values the options replace.",
-        ),
-    ],
-    rate: Annotated[
-        float | None, running("HZ", "Sample rate in Hz (100; for a crash that of each recorder).")
-    ] = None,
-    sampling: Annotated[
-        str | None,
-        running(
-            "KIND",
-            "instantaneous (the rate at the stamp) or mean (over the interval that ends "
-            "there); instantaneous, if not given.",
-        ),
-    ] = None,
-    formats: Annotated[
-        str | None,
-        writing(
-            "F",
-            "csv, npz, h5, mat (joined by commas), or all (csv); of a crash csv, mme.",
-            "--format",
-        ),
-    ] = None,
-    fixes: Annotated[
-        str | None,
-        writing(
-            "FORM", "Fixes along a trajectory, of the receiver of its [gnss]: csv, none (csv)."
-        ),
-    ] = None,
-    seed: Annotated[int | None, running("N", "Of the simulated errors (0).")] = None,
-    sensor: Annotated[
-        str | None,
-        running(
-            "NAME|FILE",
-            "The errors are those of a unit of this sensor of the catalogue (strapdown "
-            "modules), or of a .toml file of your own; the scenario's own, if not given.",
-        ),
-    ] = None,
-    units: Annotated[
-        str | None, running("NAMES", "Recorders of a crash, joined by commas, or all (IMU1,IMU2).")
-    ] = None,
+    name: str = typer.Argument(
+        metavar="NAME|FILE",
+        help="A scenario or a crash (strapdown modules), or the file (.toml) of a scenario or "
+        "a trajectory, "
+        "whose values the options replace.",
+    ),
+    rate: float | None = running(
+        "HZ", "Sample rate in Hz (100; for a crash that of each recorder)."
+    ),
+    sampling: str | None = running(
+        "KIND",
+        "instantaneous (the rate at the stamp) or mean (over the interval that ends "
+        "there); instantaneous, if not given.",
+    ),
+    formats: str | None = writing(
+        "F", "csv, npz, h5, mat (joined by commas), or all (csv); of a crash csv, mme.", "--format"
+    ),
+    fixes: str | None = writing(
+        "FORM", "Fixes along a trajectory, of the receiver of its [gnss]: csv, none (csv)."
+    ),
+    seed: int | None = running("N", "Of the simulated errors (0)."),
+    sensor: str | None = running(
+        "NAME|FILE",
+        "The errors are those of a unit of this sensor of the catalogue (strapdown "
+        "modules), or of a .toml file of your own; the scenario's own, if not given.",
+    ),
+    units: str | None = running(
+        "NAMES", "Recorders of a crash, joined by commas, or all (IMU1,IMU2)."
+    ),
     *,
-    out: Annotated[Path | None, folder_to_make("NAME-simulated")] = None,
+    out: Path | None = folder_to_make("NAME-simulated"),
     write: OutFlags,
 ) -> None:
     """Write the log of a scenario, a trajectory or a crash together with its exact truth."""
     from strapdown.api.simulation import simulate as run_simulation
-    from strapdown.cli.console import WORDS, console, print_seal, progress
-    from strapdown.cli.result_folder import claim, folder_to_write
 
     own = name.lower().endswith(".toml")
     WORDS.set("file" if own else "cli")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
+from strapdown.cli.console import console, print_findings
 from strapdown.cli.shared_options import running, with_what
+from strapdown.errors import Finding
 
 if TYPE_CHECKING:
     from strapdown.studio.server import Address
@@ -16,46 +18,34 @@ EPILOG = "Example: strapdown studio records"
 
 
 def studio(
-    folder: Annotated[
-        Path,
-        typer.Argument(
-            metavar="[FOLDER]",
-            help="Folder of the logs and the results; this one, if not given.",
-            show_default=False,
-        ),
-    ] = Path(),
-    map_file: Annotated[
-        Path | None,
-        with_what(
-            "FILE",
-            "A local map: raster tiles, .mbtiles or .pmtiles; the first in the folder, if not "
-            "given. Nothing is fetched.",
-            "--map",
-        ),
-    ] = None,
-    port: Annotated[
-        int, running("N", "Port; a free one, if not given.", show_default=False, min=0, max=65535)
-    ] = 0,
-    host: Annotated[
-        str,
-        running(
-            "ADDRESS",
-            "Address of this machine (127.0.0.1, which other machines cannot reach).",
-            show_default=False,
-        ),
-    ] = "127.0.0.1",
-    listen: Annotated[
-        bool,
-        running(
-            None,
-            "Allow an address that other machines reach: whoever knows the token may read, write "
-            "and run in the folder, and nothing is encrypted.",
-            "--listen",
-        ),
-    ] = False,
-    no_browser: Annotated[
-        bool, running(None, "Print the address, and open no browser.", "--no-browser")
-    ] = False,
+    folder: Path = typer.Argument(
+        Path(),
+        metavar="[FOLDER]",
+        help="Folder of the logs and the results; this one, if not given.",
+        show_default=False,
+    ),
+    map_file: Path | None = with_what(
+        "FILE",
+        "A local map: raster tiles, .mbtiles or .pmtiles; the first in the folder, if not "
+        "given. Nothing is fetched.",
+        "--map",
+    ),
+    port: int = running("N", "Port; a free one, if not given.", min=0, max=65535, default=0),
+    host: str = running(
+        "ADDRESS",
+        "Address of this machine (127.0.0.1, which other machines cannot reach).",
+        default="127.0.0.1",
+    ),
+    listen: bool = running(
+        None,
+        "Allow an address that other machines reach: whoever knows the token may read, write "
+        "and run in the folder, and nothing is encrypted.",
+        "--listen",
+        default=False,
+    ),
+    no_browser: bool = running(
+        None, "Print the address, and open no browser.", "--no-browser", default=False
+    ),
 ) -> None:
     """Look at logs, run the commands on them and compare results, in a browser on this machine.
 
@@ -64,16 +54,12 @@ def studio(
     process of its own, and writes what the command writes. Ctrl-C ends the server; a run that has
     begun goes on to its end.
     """
-    from strapdown.cli.console import console
     from strapdown.studio.server import serve
 
     out = console()
 
     def started(address: Address) -> None:
         if listen:
-            from strapdown.cli.console import print_findings
-            from strapdown.errors import Finding
-
             print_findings([Finding("studio.listening", folder=address.folder)])
         out.print(f"Studio of {address.folder}")
         out.print(f"Open   {address.url}")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from strapdown.cli.shared_options import Json, Quiet, Verbose, option, writing
+from strapdown.cli.console import WORDS, console, progress
+from strapdown.cli.shared_options import JSON, QUIET, VERBOSE, option, writing
+from strapdown.errors import ConfigError
 
 EPILOG = "Example: strapdown verify alexiev-fig4-attitude"
 CHANGED, IN_PART = 6, 7
@@ -16,23 +17,19 @@ checking = partial(option, "What to check")
 
 
 def verify(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that a run wrote.")],
-    seal: Annotated[
-        str | None, checking("DIGEST", "The seal that was printed when it was made.")
-    ] = None,
-    signer: Annotated[
-        str | None,
-        checking("KEY", "Public key by which it is to be signed: a file, or its name."),
-    ] = None,
-    inputs: Annotated[
-        list[Path] | None,
-        checking("PATH", "A file or folder outside DIR that may be read; repeatable.", "--input"),
-    ] = None,
-    again: Annotated[Path | None, writing("DIR", "Keep the repeated run in this folder.")] = None,
-    page: Annotated[Path | None, writing("FILE.html", "Write the result on one page.")] = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    folder: Path = typer.Argument(metavar="DIR", help="A folder that a run wrote."),
+    seal: str | None = checking("DIGEST", "The seal that was printed when it was made."),
+    signer: str | None = checking(
+        "KEY", "Public key by which it is to be signed: a file, or its name."
+    ),
+    inputs: list[Path] | None = checking(
+        "PATH", "A file or folder outside DIR that may be read; repeatable.", "--input"
+    ),
+    again: Path | None = writing("DIR", "Keep the repeated run in this folder."),
+    page: Path | None = writing("FILE.html", "Write the result on one page."),
+    json: bool = JSON,
+    quiet: bool = QUIET,
+    verbose: bool = VERBOSE,
 ) -> None:
     """Run a result again from its own configuration and compare it bit for bit.
 
@@ -42,8 +39,6 @@ def verify(
     """
     from strapdown.bundle import to_json
     from strapdown.bundle.atomic_folder import replace_file
-    from strapdown.cli.console import WORDS, console, progress
-    from strapdown.errors import ConfigError
     from strapdown.report.verify import verification_page
     from strapdown.report.verify import verify as check
 

@@ -6,21 +6,21 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from strapdown.cli.shared_options import Quiet, Verbose
+from strapdown.cli.console import console
+from strapdown.cli.shared_options import QUIET, VERBOSE
+from strapdown.errors import ConfigError
 
 EPILOG = "Example: strapdown warm-up"
 
 
-def warm_up(*, quiet: Quiet = False, verbose: Verbose = False) -> None:
+def warm_up(*, quiet: bool = QUIET, verbose: bool = VERBOSE) -> None:
     """Compile the kernels now instead of in the first runs, where they are not delivered compiled.
 
     An installation from a wheel has them compiled, and this says so. Elsewhere numba compiles each
     kernel that is called: here the demonstration is run for that, into a folder that is removed.
     """
     from strapdown._kernels.compilation import MODE, NOT_KEPT
-    from strapdown.cli.console import console
     from strapdown.cli.demo import demo_runs, made
-    from strapdown.errors import ConfigError
 
     if MODE == "compiled":
         said = "delivered compiled: the first run is as fast as a later one"

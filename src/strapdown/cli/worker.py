@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import typer
 
 from strapdown.cli.shared_options import running
@@ -12,12 +10,8 @@ EPILOG = "Example: strapdown worker tcp://192.168.1.5:8786"
 
 
 def worker(
-    scheduler: Annotated[
-        str, typer.Argument(metavar="ADDRESS", help="Scheduler of dask, tcp://HOST:8786.")
-    ],
-    workers: Annotated[
-        int | None, running("N", "Cases at a time (the cores of this machine).", min=1)
-    ] = None,
+    scheduler: str = typer.Argument(metavar="ADDRESS", help="Scheduler of dask, tcp://HOST:8786."),
+    workers: int | None = running("N", "Cases at a time (the cores of this machine).", min=1),
 ) -> None:
     """Run cases of campaigns for a scheduler of dask, until it ends.
 

@@ -19,15 +19,7 @@ from strapdown.config.crash_case import (
     UnitSpec,
 )
 from strapdown.constants import TWO_SIDED_95
-from strapdown.crash.case_contact import (
-    AXES,
-    OF_DRIVES,
-    Deformation,
-    closed_against_barrier,
-    closed_together,
-    deformed,
-    main_event,
-)
+from strapdown.crash import case_contact as contact
 from strapdown.crash.case_indices import CrashIndex, occupant_indices, vehicle_indices
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound
@@ -126,7 +118,7 @@ class CaseResult:
     partners: tuple[CaseSpec, ...] = ()
     closure: Closure | None = None
     blame: Blame | None = None
-    deformation: Deformation = field(default_factory=Deformation)
+    deformation: contact.Deformation = field(default_factory=contact.Deformation)
     indices: tuple[CrashIndex, ...] = ()
 
     @property
@@ -160,7 +152,7 @@ def run_cases(
         alone.append(run_case(spec, file, part))
     if len(alone) == 1:
         at_barrier = alone[0].spec.vehicle.against == "barrier"
-        return (closed_against_barrier(alone[0]),) if at_barrier else tuple(alone)
+        return (contact.closed_against_barrier(alone[0]),) if at_barrier else tuple(alone)
     specs = [one.spec for one in alone]
     together = [
         replace(
@@ -172,7 +164,7 @@ def run_cases(
         for k, one in enumerate(alone)
     ]
     if len(together) == 2:
-        return closed_together(*together)
+        return contact.closed_together(*together)
     only_two = Finding("crash.closure-of-two-only", severity="note", quantity="closure")
     return tuple(replace(one, findings=(*one.findings, only_two)) for one in together)
 
@@ -246,14 +238,14 @@ def run_case(
     progress("drawing possible paths", 0.4)
     samples, said = _samples(made.main.path, options.monte_carlo_runs, options.seed, progress)
     findings += said
-    deformation, stated = deformed(spec, made, tables)
+    deformation, stated = contact.deformed(spec, made, tables)
     references = tuple(
         compare_reference(reference, unit, options.gravity_m_per_s2, tables)
         for reference in stated
         for unit in dict.fromkeys((made.main, *made.units))
     )
     # Indices of the vehicle, and of the occupants of that vehicle in its records.
-    number = main_event(made.main)
+    number = contact.main_event(made.main)
     of_vehicle = () if number is None else vehicle_indices(made.main, number)
     names = {(t.path, name.lstrip("-")) for t in _triads(spec) for name in t.channels.values()}
     channels = [c for path, r in records.items() for c in r.channels if (path, c.name) in names]
@@ -374,7 +366,7 @@ def _entry(spec: CaseSpec) -> Entry | DriveEntry | None:
     entry = spec.entry
     if entry.kind == "standstill":
         return None
-    if entry.kind in OF_DRIVES:
+    if entry.kind in contact.OF_DRIVES:
         return _drive(spec)
     assert entry.speed_m_per_s is not None and entry.speed_sd_m_per_s is not None
     return Entry.from_speed(
@@ -636,7 +628,7 @@ def compare_reference(
             found.consistent,
         )
     assert spec.delta_v_m_per_s is not None
-    number = main_event(unit)
+    number = contact.main_event(unit)
     if spec.over_s is not None:
         start, end = spec.over_s
         try:
@@ -665,12 +657,12 @@ def compare_reference(
     if spec.axis == "resultant":
         value, sd = change.resultant, bound.along(change.vector)
     else:
-        axis = AXES[spec.axis]
+        axis = contact.AXES[spec.axis]
         value = float(change.vector @ axis)
         sd = bound.along(axis)
     answer = ReferenceAnswer(spec, unit.name, None, None, (start, end), value, sd, False)
     less, together = answer.difference
-    along = (1.0, 1.0, 1.0) if spec.axis == "resultant" else AXES[spec.axis]
+    along = (1.0, 1.0, 1.0) if spec.axis == "resultant" else contact.AXES[spec.axis]
     # A part is consistent with every change that continues it.
     continued = any(o and a for o, a in zip(is_open, along, strict=True)) and less * value <= 0.0
     return replace(answer, consistent=abs(less) <= together or continued)
@@ -700,7 +692,7 @@ def case_severity(spec: CaseSpec, unit: UnitReconstruction) -> tuple[SeverityAns
     Empty without an event. A model that is not valid here, or lacks an input, states why.
     `ConfigError`: a model is unknown.
     """
-    number = main_event(unit)
+    number = contact.main_event(unit)
     if number is None:
         return ()
     whole, kind = unit.body[number].event, unit.types[number].name

@@ -16,6 +16,7 @@ from strapdown.constants import Triple
 from strapdown.errors import ConfigError, Finding, check_choice
 from strapdown.nav_state import NavState
 from strapdown.sensors.triad_errors import finite, triple
+from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import Array
 
 NUMBERS = (
@@ -268,8 +269,6 @@ class EntryState:
 
 def biases_off(imu: pd.DataFrame, gyro_bias: Array, accel_bias: Array) -> pd.DataFrame:
     """Return a copy of an Imu table less biases in rad/s and m/s²."""
-    from strapdown.tables import ACCEL, GYRO
-
     out = imu[[*GYRO, *ACCEL]] - np.concatenate([gyro_bias, accel_bias])
     out.attrs = dict(imu.attrs)
     return out

@@ -16,6 +16,7 @@ from strapdown.crash.measuring_point import PointKinematics, at_point
 from strapdown.crash.path import reconstruct_path
 from strapdown.errors import ConfigError, DataError, Finding, add_warning, check_choice
 from strapdown.rotation import level
+from strapdown.sensors import pre_crash, range_merge
 from strapdown.sensors.crash_unit import (
     CrashUnit,
     RecordedTriad,
@@ -25,22 +26,6 @@ from strapdown.sensors.crash_unit import (
     with_common_assumptions,
     with_filled_axes,
     with_gyro,
-)
-from strapdown.sensors.pre_crash import (
-    FROM_GRAVITY,
-    BiasEstimate,
-    Levelling,
-    PreparedUnit,
-    find_pre_crash_rest,
-    gyro_bias_from,
-    in_axes,
-)
-from strapdown.sensors.range_merge import (
-    MergedRanges,
-    Range,
-    agreement_findings,
-    bias_from_lower_range,
-    merge_ranges,
 )
 from strapdown.sensors.rest import RestStretch, rest_between
 from strapdown.sensors.saturation import RangeLimits, find_limits
@@ -140,7 +125,7 @@ class Preparation:
         check_sd(self.steady_rate, "steady_rate", "rad/s", unit)
 
 
-def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> PreparedUnit:
+def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> pre_crash.PreparedUnit:
     """Remove biases, merge ranges, rotate into vehicle axes and level.
 
     Parameters
@@ -174,7 +159,7 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
     findings: list[Finding] = [*data.findings, *assumed_findings(unit)]
     findings += saturation_findings(unit, data, limits, gyro_limits)
     ranges = [
-        Range(y, _with_held(limit, t), s, t.uncertainty.bandwidth)
+        range_merge.Range(y, _with_held(limit, t), s, t.uncertainty.bandwidth)
         for y, limit, s, t in zip(data.accelerometers, limits, noise, triads, strict=True)
     ]
 
@@ -185,7 +170,7 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
     if not isinstance(options.rest, str):
         own: RestStretch | None = rest_between(lowest, *options.rest)
     else:
-        own = find_pre_crash_rest(
+        own = pre_crash.find_pre_crash_rest(
             lowest,
             impact=options.impact,
             moving_at_impact=options.moving_at_impact,
@@ -201,17 +186,17 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
     ):
         own = replace(own, grade="steady")
     unknown = steady_acceleration if own is not None and own.grade == "steady" else 0.0
-    turn = gyro_bias_from(own, gyro.axis("bias"), steady_rate=options.steady_rate)
+    turn = pre_crash.gyro_bias_from(own, gyro.axis("bias"), steady_rate=options.steady_rate)
     # Assumptions for missing axes are reported elsewhere.
     keep = [k not in unit.gyro.absent for k in range(3)]
-    turn = BiasEstimate(
+    turn = pre_crash.BiasEstimate(
         triad_of(np.where(keep, turn.bias, 0.0)), triad_of(np.where(keep, turn.sd, 0.0))
     )
 
     bias, bias_from, bias_sd = _range_biases(unit, data.time, ranges, own)
     findings += bias_findings(unit, bias, bias_from, own)
-    findings += agreement_findings(unit, ranges)
-    merged = merge_ranges(
+    findings += range_merge.agreement_findings(unit, ranges)
+    merged = range_merge.merge_ranges(
         data.time,
         [replace(one, bias=b) for one, b in zip(ranges, bias, strict=True)],
         margin=options.margin,
@@ -221,7 +206,7 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
     findings += step_findings(unit, merged)
 
     C = unit.mounting.C_vs
-    standing = None if own is None else in_axes(own, C)
+    standing = None if own is None else pre_crash.in_axes(own, C)
     force = merged.values @ C.T
     if levelling is not None:
         stated = np.sqrt(C**2 @ np.asarray(triads[0].uncertainty.axis("bias")) ** 2)
@@ -229,7 +214,7 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
         if shift is not None:
             # All ranges are relative to the lowest and shift with it.
             force = force - shift
-            bias_from = (FROM_GRAVITY, *bias_from[1:])
+            bias_from = (pre_crash.FROM_GRAVITY, *bias_from[1:])
             assert own is not None and own.accel_mean_sd is not None
             bias_sd = (own.accel_mean_sd, *bias_sd[1:])
     else:
@@ -237,7 +222,7 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
         findings += length_findings(unit, standing, gravity)
         level = level_at_rest(standing, unknown, gravity, unit.name)
     correction = 0.0
-    matched = bias_from[0] == FROM_GRAVITY
+    matched = bias_from[0] == pre_crash.FROM_GRAVITY
     # Missing axes are not corrected.
     whole = not triads[0].absent
     if options.match_gravity and whole and standing is not None and not matched:
@@ -248,7 +233,7 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
     imu = imu_table(
         data.time, (data.gyro - turn.bias) @ C.T, force, sampling=data.sampling, source=unit.name
     )
-    return PreparedUnit(
+    return pre_crash.PreparedUnit(
         unit=unit,
         imu=imu,
         range_spoken=merged.spoken,
@@ -271,7 +256,7 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
 
 
 def _range_biases(
-    unit: CrashUnit, time: Array, ranges: Sequence[Range], rest: RestStretch | None
+    unit: CrashUnit, time: Array, ranges: Sequence[range_merge.Range], rest: RestStretch | None
 ) -> tuple[list[Array], tuple[int | None, ...], tuple[Triad, ...]]:
     """Bias of every range relative to the lowest: each is tied to the next lower one."""
     bias: list[Array] = [np.zeros(3)]
@@ -282,7 +267,7 @@ def _range_biases(
         if rest is not None:
             low, high = ranges[j - 1], ranges[j]
             within = (time >= rest.start) & (time <= rest.end)
-            found = bias_from_lower_range(
+            found = range_merge.bias_from_lower_range(
                 time,
                 high.values,
                 low.values,
@@ -431,7 +416,9 @@ def _attitude_at_start(
 # Attitude and bias of the lowest range from the specific force before a crash.
 
 
-def level_at_rest(rest: RestStretch, unknown: float, gravity: float, source: str) -> Levelling:
+def level_at_rest(
+    rest: RestStretch, unknown: float, gravity: float, source: str
+) -> pre_crash.Levelling:
     """Roll and pitch from the mean specific force, with the sd from its noise.
 
     `unknown`, m/s²: standard deviation of the vehicle's own acceleration over the interval, each
@@ -453,7 +440,7 @@ def level_at_rest(rest: RestStretch, unknown: float, gravity: float, source: str
         ) from None
     across = math.hypot(max(rest.accel_mean_sd), unknown) / gravity
     sd = math.degrees(across / max(math.cos(math.radians(pitch)), 1e-3))
-    return Levelling(roll, pitch, sd, from_rest=True)
+    return pre_crash.Levelling(roll, pitch, sd, from_rest=True)
 
 
 def from_stated_attitude(
@@ -462,7 +449,7 @@ def from_stated_attitude(
     bias_sd: Array,
     unknown: float,
     gravity: float,
-) -> tuple[Levelling, Array | None]:
+) -> tuple[pre_crash.Levelling, Array | None]:
     """Bias of the lowest range from gravity in a stated attitude: (roll, pitch, sd), deg.
 
     `bias_sd`, (3,), m/s²: stated sd of that bias, vehicle axes; `unknown` as `level_at_rest`.
@@ -471,7 +458,7 @@ def from_stated_attitude(
     times the sd of the attitude.
     """
     roll, pitch, sd = stated
-    levelling = Levelling(float(roll), float(pitch), float(sd), from_rest=False)
+    levelling = pre_crash.Levelling(float(roll), float(pitch), float(sd), from_rest=False)
     if rest is None or rest.accel_mean is None or rest.accel_mean_sd is None:
         return levelling, None
     known = math.hypot(gravity * math.radians(sd), unknown, max(rest.accel_mean_sd))
@@ -695,7 +682,7 @@ def bias_findings(
     return found
 
 
-def step_findings(unit: CrashUnit, merged: MergedRanges) -> list[Finding]:
+def step_findings(unit: CrashUnit, merged: range_merge.MergedRanges) -> list[Finding]:
     """Report ranges that differ where one takes over from the other."""
     found: list[Finding] = []
     largest = np.abs(merged.values).max(axis=0)

@@ -12,6 +12,7 @@ import pandas as pd
 from strapdown.alignment.alignment import Alignment
 from strapdown.bundle import write_json
 from strapdown.config.alignment import AlignmentSpec
+from strapdown.report import report_bundle
 from strapdown.report.alignment_document import (
     CONVENTIONS,
     alignment_document,
@@ -19,40 +20,32 @@ from strapdown.report.alignment_document import (
     limits,
     trust,
 )
-from strapdown.report.report_bundle import (
-    ReportBundle,
-    alignment_data,
-    as_comments,
-    file_of,
-    finite,
-    with_file,
-    with_page,
-    write_table,
-)
 from strapdown.systems.alignment_run import AlignmentRun, run_alignment
 from strapdown.tables import EULER
 from strapdown.tables.checks import index_of
 
 
 def _configuration(result: AlignmentRun) -> dict[str, Any]:
-    return with_file({"alignment": result.spec.plain()}, result)
+    return report_bundle.with_file({"alignment": result.spec.plain()}, result)
 
 
 def _run(configuration: dict[str, Any]) -> AlignmentRun:
     spec = AlignmentSpec.checked(configuration["alignment"])
-    return run_alignment(spec, file_of(configuration))
+    return run_alignment(spec, report_bundle.file_of(configuration))
 
 
 def _write_data(result: AlignmentRun, folder: Path) -> None:
     write_json(folder / "align.json", alignment_json(result))
-    comments = as_comments(CONVENTIONS)
-    write_table(_attitude(result), folder / "attitude.csv", comments)
+    comments = report_bundle.as_comments(CONVENTIONS)
+    report_bundle.write_table(_attitude(result), folder / "attitude.csv", comments)
     if result.fine is not None:
-        write_table(_history(result.fine.history), folder / "fine.csv", comments)
+        report_bundle.write_table(_history(result.fine.history), folder / "fine.csv", comments)
 
 
 #: Page, JSON, tables and figures of an alignment.
-ALIGNMENT = ReportBundle("align", _configuration, _run, with_page(_write_data, alignment_document))
+ALIGNMENT = report_bundle.ReportBundle(
+    "align", _configuration, _run, report_bundle.with_page(_write_data, alignment_document)
+)
 
 
 def _attitude(result: AlignmentRun) -> pd.DataFrame:
@@ -162,11 +155,11 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
         ),
         "findings": [f.plain("file") for f in result.findings],
     }
-    return finite(data)
+    return report_bundle.finite(data)
 
 
 def _attitude_alignment_json(one: Alignment) -> dict[str, Any]:
-    data = alignment_data(one)
+    data = report_bundle.alignment_data(one)
     del data["method"]
     covariance = [list(row) for row in one.covariance]
     return {**data, "q_nb": list(one.q_nb), "covariance_ned_rad2": covariance}

@@ -12,23 +12,11 @@ from strapdown.bundle import write_json
 from strapdown.config.logs import AllanSpec
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.formats import csv
+from strapdown.report import document
 from strapdown.report.chart import AXIS_COLOURS, Chart, Line, Panel, dots
-from strapdown.report.document import (
-    Document,
-    Items,
-    Paragraph,
-    TableBlock,
-    document_of,
-    findings_list,
-    listed,
-    paragraph,
-    run_again,
-    section,
-    table_of,
-)
 from strapdown.report.report_bundle import bundle_by_specification, finite, with_page
 from strapdown.report.values import duration_words
-from strapdown.sensors.bridge import target_of
+from strapdown.sensors.bridge import TARGETS, target_of
 from strapdown.sensors.noise_terms import NoiseTerm
 from strapdown.systems.allan_run import AllanRun, run_allan
 from strapdown.tables import ACCEL, GYRO
@@ -145,7 +133,7 @@ def headline(result: AllanRun) -> str:
     )
 
 
-def term_tables(result: AllanRun) -> list[TableBlock]:
+def term_tables(result: AllanRun) -> list[document.TableBlock]:
     """Return a table of the terms of each triad; the last with the caption."""
     tables = []
     triads = [("Gyros", GYRO), ("Accelerometers", ACCEL)]
@@ -162,7 +150,7 @@ def term_tables(result: AllanRun) -> list[TableBlock]:
                 cells = tuple("–" if one is None else _cell(one, factor) for one in found)
                 rows.append((f"{name}  {words}", unit, *cells))
         caption = CAPTION if not any(used[k + 1 :]) else ""
-        tables.append(TableBlock((title, "unit", *"xyz"), tuple(rows), (0, 1), caption))
+        tables.append(document.TableBlock((title, "unit", *"xyz"), tuple(rows), (0, 1), caption))
     return tables
 
 
@@ -187,7 +175,7 @@ def _digits(value: float, digits: int) -> str:
     return f"{value:.{max(0, digits - 1 - math.floor(math.log10(value)))}f}"
 
 
-def parameter_table(result: AllanRun) -> TableBlock | None:
+def parameter_table(result: AllanRun) -> document.TableBlock | None:
     """Return the parameters of the program that was asked for."""
     if result.spec.target is None:
         return None
@@ -198,16 +186,14 @@ def parameter_table(result: AllanRun) -> TableBlock | None:
         rows.append((*words, *(f"{row[axis]:.4g}" for axis in "xyz")))
     note = f" {target.note[:1].upper()}{target.note[1:]}." if target.note else ""
     caption = f"{target.title}, by {target.source}.{note}"
-    return table_of((name, "triad", "unit", *"xyz"), rows, caption, text=(0, 1, 2))
+    return document.table_of((name, "triad", "unit", *"xyz"), rows, caption, text=(0, 1, 2))
 
 
 # Page and chart.
 
 
-def allan_document(result: AllanRun, name: str = "") -> Document:
+def allan_document(result: AllanRun, name: str = "") -> document.Document:
     """Return the report of the noise of a sensor."""
-    from strapdown.sensors.bridge import TARGETS
-
     chosen = parameter_table(result)
     rows = tuple(
         (title.title, f"strapdown allan {result.name} --for {key}")
@@ -215,31 +201,33 @@ def allan_document(result: AllanRun, name: str = "") -> Document:
         if key != "strapdown"
     )
     sections = (
-        section("deviations", "Allan deviations", allan_chart(result)),
-        section("bridge", "For another program", chosen, Items(rows), folded=chosen is None),
-        section(
+        document.section("deviations", "Allan deviations", allan_chart(result)),
+        document.section(
+            "bridge", "For another program", chosen, document.Items(rows), folded=chosen is None
+        ),
+        document.section(
             "others",
             "Modified Allan and Hadamard deviations",
             allan_chart(result, "modified"),
             allan_chart(result, "hadamard"),
             folded=True,
         ),
-        section(
+        document.section(
             "sensor",
             "Sensor file",
-            Paragraph(
+            document.Paragraph(
                 "sensor.toml, for --sensor of navigate and align. Its biases are as large as the "
                 "mean of the record suggests; scale factor and misalignment are not in it: a "
                 "record at rest does not show them."
             ),
-            paragraph(result.sensor_text(), "mono"),
+            document.paragraph(result.sensor_text(), "mono"),
             folded=True,
         ),
-        section("method", "Method", listed(METHOD), folded=True),
-        section("again", "Check this folder", *run_again(name)),
+        document.section("method", "Method", document.listed(METHOD), folded=True),
+        document.section("again", "Check this folder", *document.run_again(name)),
     )
     good = not result.findings
-    return document_of(
+    return document.document_of(
         result.name,
         "Noise of the sensor",
         (
@@ -247,9 +235,9 @@ def allan_document(result: AllanRun, name: str = "") -> Document:
             for one in result.stretches
         ),
         (
-            Paragraph(headline(result), "lead" if good else "warning"),
+            document.Paragraph(headline(result), "lead" if good else "warning"),
             *term_tables(result),
-            None if good else findings_list(result.findings, "cli"),
+            None if good else document.findings_list(result.findings, "cli"),
         ),
         sections,
         links=(

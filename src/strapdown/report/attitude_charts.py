@@ -10,13 +10,7 @@ import pandas as pd
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.constants import Array
 from strapdown.evaluation.differences import error_angles
-from strapdown.report.attitude_words import (
-    MEANINGS,
-    full_rate_errors,
-    largest_known,
-    like_with_like,
-    share_basis,
-)
+from strapdown.report import attitude_words as words
 from strapdown.report.chart import (
     AXIS_COLOURS,
     BLACK,
@@ -203,7 +197,7 @@ def _tolerance(bench: AttitudeComparison) -> tuple[float, str]:
 
 def _cost(bench: AttitudeComparison) -> Chart:
     cycles = np.array([max(cost.cycles, 1.0) for cost in bench.costs])
-    errors = full_rate_errors(bench)
+    errors = words.full_rate_errors(bench)
     names = [cost.algorithm for cost in bench.costs]
     total = _shown([errors.get(name, np.nan) for name in names])
     shares = {share.algorithm: share.own_deg[2] for share in bench.shares}
@@ -260,7 +254,7 @@ def _sweep(bench: AttitudeComparison) -> Chart:
     answer = bench.answer
     judged = bool(bench.scores)
     panels = []
-    for meaning, title in MEANINGS.items():
+    for meaning, title in words.MEANINGS.items():
         part = bench.sweep[bench.sweep["meaning"] == meaning].sort_values("rate_hz")
         if not len(part):
             continue
@@ -324,7 +318,7 @@ def _share(bench: AttitudeComparison) -> Chart:
     return Chart(
         "share",
         "Parts of the error",
-        f"Largest rotation angle due to each part. {share_basis(bench)} {_DRAWN}",
+        f"Largest rotation angle due to each part. {words.share_basis(bench)} {_DRAWN}",
         "error, deg",
         (Panel("", lines, categories=names),),
         log_x=True,
@@ -358,15 +352,15 @@ def _trials(bench: AttitudeComparison) -> Chart:
 
 
 def _peers(bench: AttitudeComparison) -> Chart:
-    alone, aided = like_with_like(bench)
-    own = [(name, error, True) for name, error in full_rate_errors(bench).items()]
+    alone, aided = words.like_with_like(bench)
+    own = [(name, error, True) for name, error in words.full_rate_errors(bench).items()]
     panels = []
     for title, ours, peers in (("Gyro alone", own, alone), ("Aided", [], aided)):
         # Name, largest error, and whether it is of strapdown.
         rows = list(ours)
         for peer in peers:
             name = f"{peer.peer} ({peer.aiding})" if title == "Aided" else peer.peer
-            error = largest_known(peer.scores)
+            error = words.largest_known(peer.scores)
             rows.append((name, np.nan if error is None else error, peer.cost is not None))
         lines = []
         for is_own, colour, symbol, who in (

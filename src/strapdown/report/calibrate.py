@@ -13,20 +13,8 @@ from strapdown.bundle import write_json
 from strapdown.config.logs import CalibrateSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.formats import csv
+from strapdown.report import document
 from strapdown.report.chart import AXIS_COLOURS, Chart, Level, Panel, dots
-from strapdown.report.document import (
-    Document,
-    Paragraph,
-    TableBlock,
-    document_of,
-    findings_list,
-    items_of,
-    listed,
-    paragraph,
-    run_again,
-    section,
-    table_of,
-)
 from strapdown.report.report_bundle import bundle_by_specification, finite, with_page
 from strapdown.report.values import about
 from strapdown.rotation import rotation_vector_from_dcm
@@ -156,7 +144,7 @@ def headline(result: CalibrateRun) -> str:
     )
 
 
-def parameter_table(result: CalibrateRun) -> TableBlock | None:
+def parameter_table(result: CalibrateRun) -> document.TableBlock | None:
     """Return the errors with their bounds."""
     found = result.calibration
     if found is None:
@@ -172,7 +160,7 @@ def parameter_table(result: CalibrateRun) -> TableBlock | None:
             text = about(factor * float(found.values[k]), 1.96 * factor * float(sd[k]), "")
             cells.append(text + ("" if observed[k] else " ?"))
         rows.append((title, unit, *cells))
-    return table_of(("Error", "unit", *XYZ), rows, CAPTION, text=(0, 1))
+    return document.table_of(("Error", "unit", *XYZ), rows, CAPTION, text=(0, 1))
 
 
 #: Residuals of the rests: title, unit, factor, columns before and after the calibration.
@@ -190,7 +178,7 @@ def _rests(result: CalibrateRun) -> pd.DataFrame | None:
     return found.rests[~found.rests["held"]]
 
 
-def effect_table(result: CalibrateRun) -> TableBlock | None:
+def effect_table(result: CalibrateRun) -> document.TableBlock | None:
     """Return what the calibration changes: force at rest, and the vertical after turns."""
     still = _rests(result)
     if still is None:
@@ -203,10 +191,10 @@ def effect_table(result: CalibrateRun) -> TableBlock | None:
             rows.append((title, unit, *(f"{v:.3g}" for v in values)))
     was, left = (float(np.square(still[n].to_numpy(np.float64)).sum()) for n in RESIDUALS[0][3])
     caption = FEW_POSES if left > was else ""
-    return table_of("Root mean square | unit | before | after", rows, caption, text=(0, 1))
+    return document.table_of("Root mean square | unit | before | after", rows, caption, text=(0, 1))
 
 
-def turn_table(result: CalibrateRun) -> TableBlock | None:
+def turn_table(result: CalibrateRun) -> document.TableBlock | None:
     """Return the known rotations beside those that the calibrated gyro measures."""
     found = result.calibration
     if found is None or not len(found.turns):
@@ -218,10 +206,10 @@ def turn_table(result: CalibrateRun) -> TableBlock | None:
     caption = (
         "Angles in deg, rates in deg/s. Left: what the end differs by from the known rotation."
     )
-    return table_of("Known rotation about | known | measured | left", rows, caption)
+    return document.table_of("Known rotation about | known | measured | left", rows, caption)
 
 
-def field_table(result: CalibrateRun) -> TableBlock | None:
+def field_table(result: CalibrateRun) -> document.TableBlock | None:
     """Return hard iron and what it leaves of the direction of the field."""
     mag = result.magnetometer
     if mag is None:
@@ -240,41 +228,43 @@ def field_table(result: CalibrateRun) -> TableBlock | None:
         pairs = zip(turn, mag.rotation_sd, strict=True)
         axes = [about(v, TWO_SIDED_95 * s / DEG, "") for v, s in pairs]
         rows.append(("axes against accelerometers", "deg", *axes))
-    return table_of(("Magnetometer", "unit", *XYZ), rows, caption, text=(0, 1))
+    return document.table_of(("Magnetometer", "unit", *XYZ), rows, caption, text=(0, 1))
 
 
 # Page and charts.
 
 
-def calibrate_document(result: CalibrateRun, name: str = "") -> Document:
+def calibrate_document(result: CalibrateRun, name: str = "") -> document.Document:
     """Return the report of a calibration."""
     found = result.calibration
     remedies = () if found is None else found.remedies
-    missing = items_of(
+    missing = document.items_of(
         ("Turn", f"by 90° or more about {one[-1]}, from rest to rest")
         if one.startswith("turn ")
         else ("Rest", f"with {one} up")
         for one in remedies
     )
     sections = (
-        section("poses", "Poses: what is missing", poses_chart(result), missing),
-        section("effect", "Before and after", rests_chart(result), turn_table(result)),
-        section("bounds", "Errors and their bounds", bounds_chart(result), folded=True),
-        section(
+        document.section("poses", "Poses: what is missing", poses_chart(result), missing),
+        document.section("effect", "Before and after", rests_chart(result), turn_table(result)),
+        document.section("bounds", "Errors and their bounds", bounds_chart(result), folded=True),
+        document.section(
             "file",
             "Calibration file",
-            Paragraph("calibration.toml, for --calibration of the commands that read a log."),
-            paragraph(result.calibration_text(), "mono"),
+            document.Paragraph(
+                "calibration.toml, for --calibration of the commands that read a log."
+            ),
+            document.paragraph(result.calibration_text(), "mono"),
             folded=True,
         ),
-        section("method", "Method", listed(METHOD), folded=True),
-        section("again", "Check this folder", *run_again(name)),
+        document.section("method", "Method", document.listed(METHOD), folded=True),
+        document.section("again", "Check this folder", *document.run_again(name)),
     )
     good = not any(f.severity == "warning" for f in result.findings)
     front = (
-        Paragraph(headline(result), "lead" if good else "warning"),
+        document.Paragraph(headline(result), "lead" if good else "warning"),
         *(parameter_table(result), effect_table(result), field_table(result)),
-        findings_list(result.findings, "cli") if result.findings else None,
+        document.findings_list(result.findings, "cli") if result.findings else None,
     )
     links = [
         ("calibrate.json", "errors with their bounds, SI"),
@@ -284,7 +274,7 @@ def calibrate_document(result: CalibrateRun, name: str = "") -> Document:
         links.append(("rests.csv", "rests with their residuals, SI"))
     facts = (("Procedure", result.procedure),)
     title = "Calibration of the sensor"
-    return document_of(result.name, title, facts, front, sections, links=links)
+    return document.document_of(result.name, title, facts, front, sections, links=links)
 
 
 def _map(up: np.ndarray[Any, Any]) -> tuple[float, float]:

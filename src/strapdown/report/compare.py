@@ -30,6 +30,7 @@ from strapdown.config.crash_case import CaseSpec
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.reading import FileSpec
 from strapdown.config.toml_file import read_toml
+from strapdown.crash.case import run_cases
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats import csv
 from strapdown.frames import place_difference
@@ -59,6 +60,7 @@ from strapdown.report.compare_tracks import (
     plain_scores,
     tracks_of,
 )
+from strapdown.report.crash_case import CRASH, file_name
 from strapdown.report.report_bundle import ReportBundle, finite, with_page
 from strapdown.units import SHOWN_UNITS
 
@@ -570,9 +572,6 @@ def _run_file(path: Path, out: Path, progress: Progress) -> None:
 
         seal = ALIGNMENT.write(run_alignment(AlignmentSpec.read(path), path), out, report=False)
     else:
-        from strapdown.crash.case import run_cases
-        from strapdown.report.crash_case import CRASH
-
         (result,) = run_cases([(CaseSpec.read(path), path)], progress)
         seal = CRASH.write(result, out, report=False)
     write_timing(seal, {"run": perf_counter() - begin})
@@ -700,7 +699,6 @@ def _write_data(sealed: _Sealed, folder: Path) -> None:
     result = sealed.comparison
     write_json(folder / "compare.json", comparison_json(result))
     made: set[str] = set()
-    from strapdown.report.crash_case import file_name
 
     for one in result.differences:
         name = file_name(f"differences-{one.run + 1}-{one.label}".rstrip("-"), made)

@@ -10,6 +10,7 @@ import numpy as np
 
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.frames import ned_from_geodetic
+from strapdown.report import values
 from strapdown.report.chart import (
     BLACK,
     BLUE,
@@ -32,13 +33,6 @@ from strapdown.report.chart import (
 )
 from strapdown.report.compare_tracks import QUANTITIES, VEHICLE, Difference, Track
 from strapdown.report.plan import PlanView, path_marks
-from strapdown.report.values import (
-    length_factor,
-    length_unit,
-    shown_in,
-    speed_factor,
-    speed_unit,
-)
 from strapdown.tables import places_of
 from strapdown.tables.checks import Array
 
@@ -55,10 +49,10 @@ def in_units(system: str | None, unit: str) -> tuple[float, str]:
     """Factor and unit in which a length or a speed is shown; `system`: of units, of a crash."""
     if system is None or unit not in ("m", "m/s"):
         return 1.0, unit
-    with shown_in(system):
+    with values.shown_in(system):
         if unit == "m":
-            return length_factor(), length_unit()
-        return speed_factor(), speed_unit()
+            return values.length_factor(), values.length_unit()
+        return values.speed_factor(), values.speed_unit()
 
 
 def quantity_words(result: RunComparison, name: str) -> tuple[str, str]:

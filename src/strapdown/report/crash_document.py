@@ -17,7 +17,9 @@ from strapdown.crash.case_contact import main_event
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath, PathComparison, PathSamples
 from strapdown.crash.reconstruction import UnitReconstruction
-from strapdown.report import crash_tables
+from strapdown.report import crash_charts as charts
+from strapdown.report import crash_outline, crash_tables, crash_words
+from strapdown.report import crash_pictures as pictures
 from strapdown.report.chart import (
     AXIS_COLOURS,
     BLACK,
@@ -35,50 +37,7 @@ from strapdown.report.chart import (
     curve,
     dots,
 )
-from strapdown.report.crash_charts import (
-    accelerations_chart,
-    delta_v_budget_chart,
-    delta_v_chart,
-    differences_chart,
-    pdof_charts,
-    place_budget_chart,
-    risk_chart,
-    sliding_chart,
-)
-from strapdown.report.crash_outline import (
-    SINCE_TRIGGER,
-    crash_span,
-    event_marks,
-    marks_apart,
-    path_moments,
-    unit_look,
-    vehicle_outline,
-)
-from strapdown.report.crash_pictures import (
-    Direction,
-    MountingPoint,
-    PointChange,
-    conventions_picture,
-    elevation_dial,
-    pdof_dial,
-    points_picture,
-)
 from strapdown.report.crash_plan import path_animation, path_plan
-from strapdown.report.crash_words import (
-    GRAVE,
-    assumptions,
-    contradictions,
-    conventions,
-    headline,
-    how_to_verify,
-    key_figures,
-    lead,
-    limitations,
-    method,
-    not_shown,
-    notes,
-    record_facts,
-)
 from strapdown.report.document import (
     Block,
     Document,
@@ -133,11 +92,11 @@ def unit_signals(
     if prepared is None:
         raise ValueError(f"{unit.name} is a mean of units, which recorded nothing")
     time = np.asarray(prepared.imu.index.to_numpy(), dtype=np.float64)
-    span = crash_span(events, float(time[0]), float(time[-1]))
+    span = crash_outline.crash_span(events, float(time[0]), float(time[-1]))
     about = [_forces_and_rates(recorded, synchronised, unit, number, span)]
     if synchronised.lender is None and recorded.gyro is not None:
         about.append(_forces_and_rates(recorded, synchronised, unit, number, span, recorded.gyro))
-    marks = event_marks(events, *span)
+    marks = crash_outline.event_marks(events, *span)
     bands = tuple(Band(1e3 * e.time_zero, 1e3 * e.end, "563 event") for e in events)
     return [
         _overview(unit, number, events),
@@ -189,7 +148,7 @@ def _forces_and_rates(
             levels[k] += near_levels(triad, C, lines[k][:1], k, scale, symbol)
     inside = (time >= span[0]) & (time <= span[1])
     values, cut = prepared.imu[columns].to_numpy(dtype=np.float64) / scale, cut & inside[:, None]
-    colour, ms = unit_look(number)["colour"], 1e3 * time
+    colour, ms = crash_outline.unit_look(number)["colour"], 1e3 * time
     for k in range(3):
         rows[k].append(curve(processed, ms[inside], values[inside, k], colour, width=2.0))
         if cut[:, k].any():
@@ -199,7 +158,7 @@ def _forces_and_rates(
         f"{slug}-{number + 1}",
         f"{unit.name}: {title}",
         f"{caption}Shaded: the 49 CFR 563 event.{told}",
-        SINCE_TRIGGER,
+        crash_outline.SINCE_TRIGGER,
         tuple(
             Panel(
                 f"{name}, {symbol}",
@@ -254,7 +213,7 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
         f"axes. Shaded: the 49 CFR 563 event; {said}." + _told(assumed),
         "time from the trigger, s",
         tuple(panels),
-        marks=marks_apart(
+        marks=crash_outline.marks_apart(
             [(e.time_zero, "time zero") for e in events], float(time[0]), float(time[-1]), 1.0
         ),
         bands=tuple(bands),
@@ -458,7 +417,7 @@ def reference_chart(
         + ("they are consistent" if comparison.consistent else "they are NOT consistent")
         + f" at the last instant (chi-square {comparison.chi_square:.3g}, limit "
         f"{comparison.chi_square_95:.3g}).",
-        SINCE_TRIGGER,
+        crash_outline.SINCE_TRIGGER,
         tuple(panels),
     )
 
@@ -517,7 +476,11 @@ def _over_time(
             y_there = (y + edge)[there]
             lines.append(Line("95 %, Monte Carlo", time[there], y_there, ORANGE, "dash", 1.2))
         panels.append(Panel(label, tuple(lines), fills=(fill,), height=0.8, steady=_STEADY))
-    named = [(at, name) for name, at in path_moments(path, events) if name not in ("begin", "end")]
+    named = [
+        (at, name)
+        for name, at in crash_outline.path_moments(path, events)
+        if name not in ("begin", "end")
+    ]
     said = " Shaded: 95 % by the linear covariance"
     if samples is not None:
         said += f"; dashed: central 95 % of {len(samples.errors)} Monte Carlo runs"
@@ -525,9 +488,9 @@ def _over_time(
         slug,
         f"{slug.capitalize()} over time",
         f"{caption}{said}.",
-        SINCE_TRIGGER,
+        crash_outline.SINCE_TRIGGER,
         tuple(panels),
-        marks=marks_apart(named, path.time[0], path.time[-1]),
+        marks=crash_outline.marks_apart(named, path.time[0], path.time[-1]),
     )
 
 
@@ -556,7 +519,7 @@ def _document(result: CaseResult, name: str) -> Document:
     main, which = found.main, main_event(found.main)
     path, events, units = main.path, main.events.events, (found.units, found.combined)
     names = axis_names(result)[:2]
-    outline, point = vehicle_outline(spec.vehicle), found.point
+    outline, point = crash_outline.vehicle_outline(spec.vehicle), found.point
     paths = [r for r in result.references if r.path is not None and r.unit == main.name]
     reference = reference_in_path_axes(path, paths[0]) if paths else None
     shown = paths[0].spec.name if paths else "reference"
@@ -578,14 +541,14 @@ def _document(result: CaseResult, name: str) -> Document:
     sources = tuple((r.name, r.source) for r in spec.references if r.source)
     happened = any(unit.body for unit in found.answers)
     described = [Paragraph(text) for text in spec.description.split("\n\n") if text.strip()]
-    limits = limitations(result)
+    limits = crash_words.limitations(result)
     sections = (
         section(
             "delta-v",
             "Delta-V",
             crash_tables.answers_table(result),
             *(
-                delta_v_chart(
+                charts.delta_v_chart(
                     *units,
                     k,
                     gravity=spec.options.gravity_m_per_s2,
@@ -593,9 +556,9 @@ def _document(result: CaseResult, name: str) -> Document:
                 )
                 for k in range(len(events))
             ),
-            sliding_chart(*units, spec.options.peak_window_s) if happened else None,
-            points_picture(outline, points) if points else None,
-            paragraph(None if happened else headline(result)),
+            charts.sliding_chart(*units, spec.options.peak_window_s) if happened else None,
+            pictures.points_picture(outline, points) if points else None,
+            paragraph(None if happened else crash_words.headline(result)),
             figures=1,
         ),
         section(
@@ -606,9 +569,9 @@ def _document(result: CaseResult, name: str) -> Document:
                 ()
                 if which is None
                 else (
-                    pdof_dial(outline, directions, **around),
-                    elevation_dial(outline, directions[which], recorders),
-                    *pdof_charts(*units, which),
+                    pictures.pdof_dial(outline, directions, **around),
+                    pictures.elevation_dial(outline, directions[which], recorders),
+                    *charts.pdof_charts(*units, which),
                 )
             ),
             paragraph(
@@ -638,7 +601,7 @@ def _document(result: CaseResult, name: str) -> Document:
             "not-shown",
             "Not shown by these records",
             Paragraph("Questions that no evaluation of these records can answer."),
-            Items(not_shown(result)),
+            Items(crash_words.not_shown(result)),
         ),
         section("severity", "Severity", *_severity(result, which)),
         section(
@@ -661,7 +624,7 @@ def _document(result: CaseResult, name: str) -> Document:
             *(
                 block
                 for record in result.records.values()
-                if (rows := record_facts(record))
+                if (rows := crash_words.record_facts(record))
                 for block in (Paragraph(f"Metadata of {record.path.name}:"), Facts(rows))
             ),
             folded=True,
@@ -698,17 +661,17 @@ def _document(result: CaseResult, name: str) -> Document:
                 "Each unknown was propagated through the whole computation; those of one kind are "
                 "summed here."
             ),
-            None if which is None else delta_v_budget_chart(main.body[which].event),
-            place_budget_chart(path, names),
+            None if which is None else charts.delta_v_budget_chart(main.body[which].event),
+            charts.place_budget_chart(path, names),
             crash_tables.budget_table(result),
             folded=True,
         ),
         section(
             "assumptions",
             "Method and assumptions",
-            items_of((("", step) for step in method(result)), numbered=True),
+            items_of((("", step) for step in crash_words.method(result)), numbered=True),
             Paragraph("Assumptions:"),
-            Items(assumptions(result)),
+            Items(crash_words.assumptions(result)),
             folded=True,
         ),
         section(
@@ -723,19 +686,22 @@ def _document(result: CaseResult, name: str) -> Document:
         section(
             "conventions",
             "Conventions",
-            conventions_picture(
+            pictures.conventions_picture(
                 outline,
-                [MountingPoint(u.name, u.mounting.position, k) for k, u in enumerate(result.units)],
+                [
+                    pictures.MountingPoint(u.name, u.mounting.position, k)
+                    for k, u in enumerate(result.units)
+                ],
                 point=point,
                 point_name=spec.point.name,
             ),
-            Facts(conventions()),
+            Facts(crash_words.conventions()),
             folded=True,
         ),
         section(
             "verify",
             "Verification",
-            Items(how_to_verify()),
+            Items(crash_words.how_to_verify()),
             Paragraph(f"strapdown verify {name}", "mono"),
             crash_tables.inputs_table(result),
             folded=True,
@@ -757,20 +723,20 @@ def _document(result: CaseResult, name: str) -> Document:
         ("Recorders", ", ".join(u.name for u in result.units)),
         ("Author", spec.author),
     )
-    dial = pdof_dial(outline, directions, **around, small=True)
-    against = contradictions(result)
-    grave = [head for code, head, _ in limits if code in GRAVE]
-    others = [head for code, head, _ in limits if code not in GRAVE]
+    dial = pictures.pdof_dial(outline, directions, **around, small=True)
+    against = crash_words.contradictions(result)
+    grave = [head for code, head, _ in limits if code in crash_words.GRAVE]
+    others = [head for code, head, _ in limits if code not in crash_words.GRAVE]
     return document_of(
         spec.title,
         "Crash reconstruction from inertial records",
         (fact for fact in facts if fact[1]),
         (
             KeyFigures(
-                key_figures(result),
+                crash_words.key_figures(result),
                 (*((dial,) if directions else ()), path_plan(path, outline, small=True, **seen)),
             ),
-            Paragraph(lead(result), "lead"),
+            Paragraph(crash_words.lead(result), "lead"),
             Paragraph(f"Caution: {'; '.join(grave)} (see Limitations).", "warning")
             if grave
             else None,
@@ -807,13 +773,13 @@ def _agreement(result: CaseResult) -> tuple[Block | None, ...]:
     comparison = found.comparison
     if comparison is None:
         return (Paragraph("One recorder: no comparison."),)
-    words = notes(comparison.findings, result, remedies=False)
+    words = crash_words.notes(comparison.findings, result, remedies=False)
     remedies = dict.fromkeys(text for f in comparison.findings if (text := f.advice("file")))
     return (
         crash_tables.comparison_table(result),
         crash_tables.turning_table(result),
-        differences_chart(comparison, [u.name for u in found.units]),
-        accelerations_chart(found.units, found.combined, found.main.events.events),
+        charts.differences_chart(comparison, [u.name for u in found.units]),
+        charts.accelerations_chart(found.units, found.combined, found.main.events.events),
         items_of(words),
         paragraph(f"Remedies: {'; '.join(remedies)}." if remedies else None),
     )
@@ -829,7 +795,7 @@ def _severity(result: CaseResult, which: int | None) -> tuple[Block | None, ...]
     if which is not None and risks:
         main = result.reconstruction.main
         change = main.body[which].event
-        chart = risk_chart(
+        chart = charts.risk_chart(
             risks,
             change.resultant,
             change.resultant_bound / TWO_SIDED_95,
@@ -842,9 +808,13 @@ def _severity(result: CaseResult, which: int | None) -> tuple[Block | None, ...]
 def _findings(result: CaseResult) -> tuple[Block | None, ...]:
     comparison = result.reconstruction.comparison
     told = () if comparison is None else comparison.findings
-    rows = notes([f for f in result.findings if f not in told], result)
+    rows = crash_words.notes([f for f in result.findings if f not in told], result)
     if not rows:
-        more = " What contradicts the answer is on page one." if contradictions(result) else ""
+        more = (
+            " What contradicts the answer is on page one."
+            if crash_words.contradictions(result)
+            else ""
+        )
         return (Paragraph(f"No findings from reading and processing the records.{more}"),)
     elsewhere = "Differences between recorders are under Consistency of the recorders."
     return (
@@ -871,9 +841,9 @@ def reference_in_path_axes(path: CrashPath, answer: ReferenceAnswer) -> pd.DataF
     )
 
 
-def _direction(unit: UnitReconstruction, k: int, name: str, **more: Any) -> Direction:
+def _direction(unit: UnitReconstruction, k: int, name: str, **more: Any) -> pictures.Direction:
     change, angle = unit.body[k].event, unit.types[k].direction
-    return Direction(
+    return pictures.Direction(
         name,
         angle.horizontal_deg,
         change.interval.horizontal,
@@ -885,7 +855,7 @@ def _direction(unit: UnitReconstruction, k: int, name: str, **more: Any) -> Dire
     )
 
 
-def _recorders(result: CaseResult) -> list[Direction]:
+def _recorders(result: CaseResult) -> list[pictures.Direction]:
     """Direction of force of the severest event of every recorder; none of a single one."""
     units = result.reconstruction.units
     if len(units) == 1:
@@ -898,7 +868,7 @@ def _recorders(result: CaseResult) -> list[Direction]:
     ]
 
 
-def _points(result: CaseResult) -> list[PointChange]:
+def _points(result: CaseResult) -> list[pictures.PointChange]:
     """Change of velocity of every recorder at its own position, over its severest contact."""
     found = []
     for number, unit in enumerate(result.reconstruction.units):
@@ -917,8 +887,8 @@ def _points(result: CaseResult) -> list[PointChange]:
         moved = np.cross(rate[-1] - rate[0], lever)
         moved = moved + (0.5 * steps * (inward[1:] + inward[:-1])).sum(axis=0)
         x, y, z = (change.delta_v.vector + moved).tolist()
-        at = MountingPoint(name, position, number)
-        found.append(PointChange(at, (x, y, z), change.bound.covariance, change.at_least))
+        at = pictures.MountingPoint(name, position, number)
+        found.append(pictures.PointChange(at, (x, y, z), change.bound.covariance, change.at_least))
     return found
 
 

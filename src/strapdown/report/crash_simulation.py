@@ -17,15 +17,8 @@ from strapdown.bundle import Seal, check_destination, write_bundle, write_json
 from strapdown.config.sources import CrashSimulationSpec
 from strapdown.crash.pdof import pdof
 from strapdown.errors import check_choice
+from strapdown.formats import crash_writers as writers
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
-from strapdown.formats.crash_writers import (
-    ACCEL_HEADINGS,
-    GYRO_HEADINGS,
-    TIME,
-    write_mme,
-    write_path_csv,
-    write_recorder_csv,
-)
 from strapdown.sensors.catalogue import KEYS, load_sensor
 from strapdown.sensors.crash_unit import Mounting, RecordedTriad
 from strapdown.sensors.uncertainty import TriadUncertainty, uncertainty_of
@@ -94,8 +87,8 @@ def write_crash_simulation(
         for name in reversed(formats):
             for unit in recorded.units:
                 places |= RECORD_WRITERS[name](folder, unit)
-        write_path_csv(folder / "cameras.csv", recorded.camera_path)
-        write_path_csv(folder / "truth.csv", recorded.truth)
+        writers.write_path_csv(folder / "cameras.csv", recorded.camera_path)
+        writers.write_path_csv(folder / "truth.csv", recorded.truth)
         text = case_text(recorded, places, spec.seed)
         (folder / "case.toml").write_text(text, encoding="utf-8", newline="\n")
         write_json(folder / "scenario.json", _description(spec, recorded))
@@ -137,9 +130,9 @@ def _write_csv(folder: Path, of: RecordedUnit) -> dict[str, PartPlace]:
     places = {}
     for which, _, triad, _ in _parts(of):
         name = part_file(of, which)
-        write_recorder_csv(folder / f"{name}.csv", triad.table)
-        headings = GYRO_HEADINGS if which is None else ACCEL_HEADINGS
-        places[name] = PartPlace(f"{name}.csv", headings, TIME)
+        writers.write_recorder_csv(folder / f"{name}.csv", triad.table)
+        headings = writers.GYRO_HEADINGS if which is None else writers.ACCEL_HEADINGS
+        places[name] = PartPlace(f"{name}.csv", headings, writers.TIME)
     return places
 
 
@@ -155,7 +148,7 @@ def _write_mme(folder: Path, of: RecordedUnit) -> dict[str, PartPlace]:
         tuple(c for triple in channels.values() for c in triple),
         (),
     )
-    codes = write_mme(folder / name, record, name=name)
+    codes = writers.write_mme(folder / name, record, name=name)
     return {
         part: PartPlace(f"{name}/{name}.mme", (codes[x.name], codes[y.name], codes[z.name]))
         for part, (x, y, z) in channels.items()

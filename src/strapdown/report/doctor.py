@@ -17,6 +17,7 @@ from strapdown.constants import MICRO_G, Array
 from strapdown.errors import DataError, Finding, Words
 from strapdown.formats.clocks import UNIX, on_clock_of
 from strapdown.formats.recording import AXES_OF_SENSOR, PLACEHOLDERS
+from strapdown.frames import ways_between
 from strapdown.report.chart import AXIS_COLOURS, BLACK, BLUE, GREY, Band, Chart, Line, Panel, curve
 from strapdown.report.document import (
     Block,
@@ -469,8 +470,6 @@ def _speed(one: LogDiagnosis) -> Line | None:
     if known.any():
         speed = np.where(known, np.hypot(*values_of(gnss, VELOCITY)[:, :2].T), np.nan)
     else:
-        from strapdown.frames import ways_between
-
         speed = np.append(ways_between(values_of(gnss, GEODETIC)) / np.diff(time), np.nan)
     return curve("speed over ground", time, speed, BLUE, width=1.2, buckets=BUCKETS)
 

@@ -13,19 +13,8 @@ from strapdown.config.navigation import ExtrinsicsSpec
 from strapdown.config.toml_text import array, number, string
 from strapdown.evaluation.extrinsics import Estimate
 from strapdown.navigation.record import innovation_labels
+from strapdown.report import document
 from strapdown.report.chart import AXIS_COLOURS, GREY, Chart, Panel, curve
-from strapdown.report.document import (
-    Document,
-    Items,
-    Paragraph,
-    TableBlock,
-    document_of,
-    findings_list,
-    listed,
-    paragraph,
-    run_again,
-    section,
-)
 from strapdown.report.report_bundle import bundle_by_specification, finite, with_page
 from strapdown.report.values import bounded
 from strapdown.systems.extrinsics_run import ExtrinsicsRun, run_extrinsics
@@ -211,7 +200,7 @@ def headline(result: ExtrinsicsRun) -> str:
     )
 
 
-def table(result: ExtrinsicsRun) -> TableBlock:
+def table(result: ExtrinsicsRun) -> document.TableBlock:
     """Return the parameters with their bounds."""
     rows = []
     if result.result.rotation is not None:
@@ -229,7 +218,7 @@ def table(result: ExtrinsicsRun) -> TableBlock:
             state += f", {one.prior_share:.0%} assumed"
         rows.append((words + axis, *_value(one.value, one.bound, factor), unit, state))
     columns = ("parameter", "value", "±, 95 %", "unit", "")
-    return TableBlock(columns, tuple(rows), (0, 3, 4), "; ".join(CONVENTION) + ".")
+    return document.TableBlock(columns, tuple(rows), (0, 3, 4), "; ".join(CONVENTION) + ".")
 
 
 def _seen(observed: bool) -> str:
@@ -242,27 +231,33 @@ def _value(value: float, bound: float, factor: float) -> tuple[str, str]:
     return said, half.removeprefix("±").strip() or "–"
 
 
-def extrinsics_document(result: ExtrinsicsRun, name: str = "") -> Document:
+def extrinsics_document(result: ExtrinsicsRun, name: str = "") -> document.Document:
     """Return the report of the extrinsics of two sensors."""
     found = result.result
     gnss = found.kind == "gnss"
     lines = "\n".join(navigation_lines(result)) if gnss else None
     sections = (
-        section("match", "Match", match_chart(result)),
-        section("navigation", "For a navigation configuration", paragraph(lines, "mono")),
-        section("bridge", "For another program", Items(tuple(bridges(result).items()))),
-        section("method", "Method", listed(METHOD_GNSS if gnss else METHOD), folded=True),
-        section("again", "Check this folder", *run_again(name)),
+        document.section("match", "Match", match_chart(result)),
+        document.section(
+            "navigation", "For a navigation configuration", document.paragraph(lines, "mono")
+        ),
+        document.section(
+            "bridge", "For another program", document.Items(tuple(bridges(result).items()))
+        ),
+        document.section(
+            "method", "Method", document.listed(METHOD_GNSS if gnss else METHOD), folded=True
+        ),
+        document.section("again", "Check this folder", *document.run_again(name)),
     )
     good = all(one.observed for one in found.estimates)
-    return document_of(
+    return document.document_of(
         result.name,
         "Extrinsics",
         (("Used", f"{found.start:.6g} s to {found.end:.6g} s"),),
         (
-            Paragraph(headline(result), "lead" if good else "warning"),
+            document.Paragraph(headline(result), "lead" if good else "warning"),
             table(result),
-            findings_list(result.findings, "cli") if result.findings else None,
+            document.findings_list(result.findings, "cli") if result.findings else None,
         ),
         sections,
         links=(

@@ -16,15 +16,7 @@ from strapdown.config.toml_file import read_toml
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
 from strapdown.navigation.outage import QUANTITIES, Forecast
-from strapdown.report.outage_document import (
-    drifts_of,
-    end_bound,
-    headline,
-    inside_words,
-    outage_document,
-    remedy,
-    start_words,
-)
+from strapdown.report import outage_document as document
 from strapdown.report.report_bundle import (
     ReportBundle,
     file_of,
@@ -118,7 +110,9 @@ def _write_data(result: OutageRun, folder: Path) -> None:
 
 
 #: Page, JSON and cone of the drift of an outage prediction.
-OUTAGE = ReportBundle("outage", _configuration, _run, with_page(_write_data, outage_document))
+OUTAGE = ReportBundle(
+    "outage", _configuration, _run, with_page(_write_data, document.outage_document)
+)
 
 
 # JSON and tables of an outage prediction.
@@ -154,14 +148,14 @@ def outage_parts(result: OutageRun) -> dict[str, Any]:
     parts = {
         "name": result.name,
         "what": result.what,
-        "answer": spaced(headline(result)),
-        "remedy": lambda: spaced(remedy(result)),
+        "answer": spaced(document.headline(result)),
+        "remedy": lambda: spaced(document.remedy(result)),
         "outage_s": result.spec.outage_s,
-        "start": spaced(start_words(result)),
+        "start": spaced(document.start_words(result)),
         "begin_s": predicted.begin,
         "remaining_measurements": list(result.stays),
         "at_the_end": {
-            "horizontal_95_m": end_bound(result),
+            "horizontal_95_m": document.end_bound(result),
             **{SHOWN[q][0]: SHOWN[q][1] * math.sqrt(max(v, 0.0)) for q, v in whole.items()},
         },
         "budget": lambda: _budget(predicted),
@@ -172,7 +166,7 @@ def outage_parts(result: OutageRun) -> dict[str, Any]:
             "rejected_fixes": sum(d.rejected for d in result.drifts),
         },
         "probability": None if result.verdict is None else result.verdict.probability,
-        "measured": spaced(inside_words(result)),
+        "measured": spaced(document.inside_words(result)),
         "drifts": [
             {
                 "begin_s": d.span.begin,
@@ -189,7 +183,7 @@ def outage_parts(result: OutageRun) -> dict[str, Any]:
                 "predicted_95_m": float(d.bound[-1]),
                 "inside_95": float(d.inside.mean()),
             }
-            for d in drifts_of(result.drifts)
+            for d in document.drifts_of(result.drifts)
         ],
         "findings": [f.plain("file") for f in result.findings],
     }
@@ -245,7 +239,7 @@ def write_outage_tables(result: OutageRun, folder: Path) -> None:
         "outage_from_s": f"{predicted.begin:.9g}",
     }
     csv.write(folder / "budget.csv", {"time_s": predicted.time, **parts}, of)
-    drifts = drifts_of(result.drifts)
+    drifts = document.drifts_of(result.drifts)
     if drifts:
         columns = {
             "outage_from_s": np.concatenate([np.full(len(d.time), d.span.begin) for d in drifts]),

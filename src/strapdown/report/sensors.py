@@ -18,17 +18,8 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, Finding
 from strapdown.formats import csv
 from strapdown.progress import Progress, silent
+from strapdown.report import document
 from strapdown.report.chart import Chart, Line, Panel, look
-from strapdown.report.document import (
-    Document,
-    TableBlock,
-    document_of,
-    findings_list,
-    listed,
-    run_again,
-    section,
-    table_of,
-)
 from strapdown.report.report_bundle import ReportBundle, finite, with_page
 from strapdown.report.values import length_words, three_digits
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, SENSORS, Sensor, load_sensor
@@ -232,7 +223,7 @@ def catalogue_table(sensors: Sequence[Sensor] = ()) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def list_block(table: pd.DataFrame) -> TableBlock:
+def list_block(table: pd.DataFrame) -> document.TableBlock:
     """Return the list of sensors as a table of a page or a terminal."""
 
     def shown(value: Any) -> str:
@@ -245,10 +236,12 @@ def list_block(table: pd.DataFrame) -> TableBlock:
     rows = [tuple(shown(value) for value in row) for row in kept.itertuples(index=False)]
     price = zip(table["assumed"], table["figures"], strict=True)
     rows = [(*row, f"{a} of {n}") for row, (a, n) in zip(rows, price, strict=True)]
-    return TableBlock((*kept.columns, "assumed"), tuple(rows), text=(0, 1), caption=LIST_CAPTION)
+    return document.TableBlock(
+        (*kept.columns, "assumed"), tuple(rows), text=(0, 1), caption=LIST_CAPTION
+    )
 
 
-def drift_block(run: SensorsRun) -> TableBlock | None:
+def drift_block(run: SensorsRun) -> document.TableBlock | None:
     """Return the standard deviations of each sensor at the end of the outage."""
     if run.drift.empty:
         return None
@@ -258,10 +251,10 @@ def drift_block(run: SensorsRun) -> TableBlock | None:
         rows.append((str(name), length_words(row["position_sd_m"]), *angles))
     after = f"after {run.spec.outage_s:g} s without fixes at {run.spec.speed_m_per_s:g} m/s"
     columns = "sensor | position | roll and pitch, deg | heading, deg"
-    return table_of(columns, rows, f"Standard deviations {after}.")
+    return document.table_of(columns, rows, f"Standard deviations {after}.")
 
 
-def figures_block(sensor: Sensor) -> TableBlock:
+def figures_block(sensor: Sensor) -> document.TableBlock:
     """Return every figure of a sensor with its source, or why it is assumed."""
     rows = []
     for figure in sensor.sources:
@@ -270,7 +263,7 @@ def figures_block(sensor: Sensor) -> TableBlock:
         where = figure.source or f"assumed: {figure.assumed}"
         rows.append((figure.key, ", ".join(f"{v:.6g}" for v in values), where))
     title = f"{sensor.title} ({sensor.name}, {sensor.grade}): {sensor.summary}"
-    return TableBlock(
+    return document.TableBlock(
         ("figure, with its unit", "value", "source"), tuple(rows), (0, 2), "", (), title
     )
 
@@ -317,26 +310,26 @@ def _line(name: str, x: Any, y: Any, k: int) -> Line:
     return Line(name, x, y, look(k)["colour"], look(k)["dash"])
 
 
-def sensors_document(run: SensorsRun, name: str) -> Document:
+def sensors_document(run: SensorsRun, name: str) -> document.Document:
     """Return the page of a comparison."""
     sections = (
-        section("deviations", "Noise", allan_chart(run)),
-        section("drift", "Drift in an outage", drift_chart(run)),
+        document.section("deviations", "Noise", allan_chart(run)),
+        document.section("drift", "Drift in an outage", drift_chart(run)),
         *(
-            section(one.name, f"Figures of {one.name}", figures_block(one), folded=True)
+            document.section(one.name, f"Figures of {one.name}", figures_block(one), folded=True)
             for one in run.sensors
         ),
-        section("method", "Method", listed(METHOD), folded=True),
-        section("again", "Check this folder", *run_again(name)),
+        document.section("method", "Method", document.listed(METHOD), folded=True),
+        document.section("again", "Check this folder", *document.run_again(name)),
     )
-    return document_of(
+    return document.document_of(
         ", ".join(one.name for one in run.sensors),
         "Sensors compared",
         (),
         (
             list_block(catalogue_table(run.sensors)),
             drift_block(run),
-            findings_list(run.findings, "cli") if run.findings else None,
+            document.findings_list(run.findings, "cli") if run.findings else None,
         ),
         sections,
         links=(("sensors.json", "figures and drift"), ("drift.csv", "drift over time")),

@@ -10,14 +10,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.constants import Flags
-from strapdown.dsp.decimation import (
-    Resampled,
-    decimate,
-    interpolate,
-    interpolated_means,
-    low_pass_design,
-    mean_samples,
-)
+from strapdown.dsp import decimation
 from strapdown.dsp.delay import Delay, EvenSignal, find_delay
 from strapdown.dsp.samples import even_step
 from strapdown.errors import DataError, Finding, add_warning
@@ -363,7 +356,7 @@ def _resample(
     rate: float,
     sampling: str,
     attenuation: float,
-) -> tuple[Resampled, str]:
+) -> tuple[decimation.Resampled, str]:
     own = g.step if channels.sampling == "mean" else 0.0
     at = stamps + offset
     if _is_faster(g, rate):
@@ -373,7 +366,7 @@ def _resample(
             raise error.replaced(file=channels.source) from None
         try:
             if sampling == "mean":
-                return mean_samples(
+                return decimation.mean_samples(
                     g.values,
                     g.time[0],
                     step,
@@ -382,8 +375,8 @@ def _resample(
                     sampling=channels.sampling,
                     marked=held,
                 ), "averaged"
-            design = low_pass_design(step, rate, attenuation=attenuation)
-            return decimate(
+            design = decimation.low_pass_design(step, rate, attenuation=attenuation)
+            return decimation.decimate(
                 g.values, g.time[0] - 0.5 * own, step, at, design, marked=held
             ), "decimated"
         except DataError as error:
@@ -394,10 +387,12 @@ def _resample(
         if len(near) == len(at) and np.abs(near - at).max() < SAME_STAMP * g.step:
             rows = slice(first, first + len(at))
             one = np.ones(len(at))
-            return Resampled(g.values[rows], one, one > 0.0, held[rows]), "as recorded"
-        return interpolate(g.time, g.values, at, marked=held), "interpolated"
+            return decimation.Resampled(g.values[rows], one, one > 0.0, held[rows]), "as recorded"
+        return decimation.interpolate(g.time, g.values, at, marked=held), "interpolated"
     centred = g.time - 0.5 * own
     if sampling == "mean" and own == 0.0:
-        return interpolated_means(centred, g.values, at, 1.0 / rate, marked=held), "interpolated"
+        return decimation.interpolated_means(
+            centred, g.values, at, 1.0 / rate, marked=held
+        ), "interpolated"
     middle = at - (0.5 / rate if sampling == "mean" else 0.0)
-    return interpolate(centred, g.values, middle, marked=held), "interpolated"
+    return decimation.interpolate(centred, g.values, middle, marked=held), "interpolated"

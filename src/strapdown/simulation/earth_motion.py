@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown import rotation
+from strapdown._kernels.earth import feel, place_rates, swing
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.simulation.motion import RateIntegral, check_numbers, integrate_rate
@@ -142,8 +143,6 @@ class EarthMotion(ABC):
         rotation and change of the Earth's rate and the transport rate along the course.
         ConfigError: the motion does not provide the second derivative of its attitude.
         """
-        from strapdown._kernels.earth import swing
-
         k = self.kinematics(_instants(time))
         if k.swinging is None:
             raise ConfigError(
@@ -189,8 +188,6 @@ class EarthMotion(ABC):
         return trajectory_table(t, place, k.velocity, _euler(k), source=source)
 
     def _feel(self, time: ArrayLike) -> tuple[Array, Array]:
-        from strapdown._kernels.earth import feel
-
         k = self.kinematics(_instants(time))
         place = self.origin.place(k.moved)
         far = ~(np.abs(place[:, 2]) <= FARTHEST)
@@ -305,8 +302,6 @@ def integrate_velocity(
     iteration: each iteration integrates the rates at the previous positions, as Legendre series
     over panels, until the change is within rounding.
     """
-    from strapdown._kernels.earth import place_rates
-
     parameters = ellipsoid.parameters()
     scaled: RateIntegral | None = None
     ends = np.asarray(breaks, dtype=np.float64)

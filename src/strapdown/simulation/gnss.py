@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
+from strapdown.earth import radii_of_curvature
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.frames import antenna_motion
@@ -226,8 +227,6 @@ def velocity_of_point(motion: EarthMotion, time: Array, arm: ArrayLike) -> Array
 
 def moved_places(place: Array, off: Array, ellipsoid: Ellipsoid = WGS84) -> Array:
     """Displace positions by meters north, east, down, (n, 3)."""
-    from strapdown.earth import radii_of_curvature
-
     meridian, transverse = radii_of_curvature(place[:, 0], ellipsoid=ellipsoid)
     out = place.copy()
     out[:, 0] += np.degrees(off[:, 0] / (meridian + place[:, 2]))

@@ -12,14 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError
-from strapdown.sensors.error_chain import (
-    Seed,
-    apply,
-    child,
-    jitter,
-    mean_of_filtered,
-    time_constant,
-)
+from strapdown.sensors import error_chain
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.motion import Motion
 from strapdown.tables import attitude_table, check_sampling_kind, imu_table
@@ -87,7 +80,7 @@ def simulate_imu(
         errors.gyro,
         time,
         sampling=sampling,
-        seed=child(seed, GYRO_SEED),
+        seed=error_chain.child(seed, GYRO_SEED),
         specific_force=plain,
     )
     accel = plain if accelerometer else None
@@ -97,7 +90,7 @@ def simulate_imu(
             errors.accel,
             time,
             sampling=sampling,
-            seed=child(seed, ACCEL_SEED),
+            seed=error_chain.child(seed, ACCEL_SEED),
             specific_force=plain,
         )
     return (
@@ -112,7 +105,7 @@ def sample_gyro(
     time: Array,
     *,
     sampling: str = "instantaneous",
-    seed: Seed = 0,
+    seed: error_chain.Seed = 0,
     straight: float = 0.0,
     specific_force: Array | None = None,
 ) -> Array:
@@ -127,7 +120,7 @@ def sample_gyro(
     plain = specific_force
     if plain is None and np.any(np.asarray(errors.g_sensitivity)):
         plain = _sampled(motion, TriadErrors(), time, sampling, 0, 0.0, of_force=True)
-    return apply(
+    return error_chain.apply(
         errors,
         time,
         _sampled(motion, errors, time, sampling, seed, straight, of_force=False),
@@ -144,7 +137,7 @@ def sample_accelerometer(
     time: Array,
     *,
     sampling: str = "instantaneous",
-    seed: Seed = 0,
+    seed: error_chain.Seed = 0,
     straight: float = 0.0,
     vibration: Array | None = None,
     specific_force: Array | None = None,
@@ -161,7 +154,7 @@ def sample_accelerometer(
     true = plain
     if errors.jitter > 0.0 or np.isfinite(errors.bandwidth):
         true = _sampled(motion, errors, time, sampling, seed, straight, of_force=True)
-    return apply(
+    return error_chain.apply(
         errors,
         time,
         true,
@@ -202,7 +195,7 @@ def _sampled(
     errors: TriadErrors,
     time: Array,
     sampling: str,
-    seed: Seed,
+    seed: error_chain.Seed,
     straight: float,
     *,
     of_force: bool,
@@ -251,7 +244,7 @@ def _measured(
     errors: TriadErrors,
     time: Array,
     sampling: str,
-    seed: Seed,
+    seed: error_chain.Seed,
     straight: float,
     *,
     of_force: bool,
@@ -259,7 +252,7 @@ def _measured(
     step, at = float(time[1] - time[0]), time
     if errors.jitter > 0.0:
         # The motion is known from zero to its end.
-        at = time + jitter(errors, np.full(time.size, time[1] - time[0]), seed)
+        at = time + error_chain.jitter(errors, np.full(time.size, time[1] - time[0]), seed)
         at = np.clip(at, 0.0, motion.duration)
     quantity: Quantity = motion.specific_force if of_force else motion.rate
     cuts: Sequence[float] = getattr(motion, "cuts", ()) if of_force else ()
@@ -275,7 +268,7 @@ def _measured(
     if np.isinf(errors.bandwidth):
         return mean
     ends = low_passed_at(quantity, at, errors.bandwidth, cuts, straight)
-    return mean_of_filtered(ends, mean, np.full(at.size, step), errors.bandwidth)
+    return error_chain.mean_of_filtered(ends, mean, np.full(at.size, step), errors.bandwidth)
 
 
 # Low-pass and means of a continuous quantity, as a sampler sees it.
@@ -361,7 +354,7 @@ def low_passed(
         return quantity(instants)
     from strapdown._kernels.signals import first_order
 
-    tau = time_constant(bandwidth)
+    tau = error_chain.time_constant(bandwidth)
     steps = np.diff(instants)
     out = np.empty((instants.size, 3))
     drive = np.empty((steps.size, 3))

@@ -15,6 +15,7 @@ from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 
 from strapdown import rotation
+from strapdown._kernels.piecewise import legendre_sums
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError
 from strapdown.tables.checks import Array
@@ -486,8 +487,6 @@ class RateIntegral:
 
     def __call__(self, time: ArrayLike) -> Array:
         """Integral from the first edge; constant beyond both ends; (n, 3), rad."""
-        from strapdown._kernels.piecewise import legendre_sums
-
         t = np.clip(np.asarray(time, dtype=np.float64), self.edges[0], self.edges[-1])
         out = np.empty((t.size, 3))
         legendre_sums(self.edges, self.before, self.series, t, out)

@@ -11,6 +11,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from strapdown._kernels.earth import radii, velocities
+from strapdown._kernels.piecewise import polynomials
 from strapdown.constants import Triple
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
@@ -116,8 +118,6 @@ class SplineMotion(EarthMotion):
 
     def kinematics(self, time: Array) -> Kinematics:
         """State at given instants; as `EarthMotion.kinematics`."""
-        from strapdown._kernels.earth import velocities
-
         moved, first, second = self._course(time)
         velocity, acceleration = np.empty(moved.shape), np.empty(moved.shape)
         parameters = self.ellipsoid.parameters()
@@ -148,8 +148,6 @@ class SplineMotion(EarthMotion):
 
     def _look(self) -> None:
         """Check that the spline between the positions is a feasible motion."""
-        from strapdown._kernels.earth import velocities
-
         part = np.linspace(0.0, 1.0, _LOOKS, endpoint=False)
         looks = (self.time[:-1, None] + np.diff(self.time)[:, None] * part).ravel()
         looks = np.append(looks, self.time[-1])
@@ -260,8 +258,6 @@ class Spline:
 
     def __call__(self, time: Array) -> tuple[Array, Array, Array]:
         """Value and first two derivatives, (n, m) each."""
-        from strapdown._kernels.piecewise import polynomials
-
         shape = (time.size, self.coefficients.shape[2])
         value, first, second = np.empty(shape), np.empty(shape), np.empty(shape)
         polynomials(self.knots, self.coefficients, time, value, first, second)
@@ -344,7 +340,6 @@ def _times(places: Array, speeds: Sequence[float], ellipsoid: Ellipsoid) -> Arra
     for k, speed in enumerate(speeds):
         if not 0.0 < speed < math.inf:
             raise ConfigError("simulation.speed-2", quantity=f"place {k + 2}, speed", speed=speed)
-    from strapdown._kernels.earth import radii
 
     times = [0.0]
     for (lat, lon, alt), (to_lat, to_lon, to_alt), speed in zip(

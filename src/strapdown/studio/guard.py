@@ -17,6 +17,7 @@ from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from strapdown.errors import Finding
 from strapdown.studio.folder import Limits
 
 Message = MutableMapping[str, Any]
@@ -187,8 +188,6 @@ class Guard:
 
 def said(code: str) -> dict[str, Any]:
     """Return a refusal as JSON: code, sentence, remedy."""
-    from strapdown.errors import Finding
-
     one = Finding(code, severity="error")
     return {"code": code, "text": one.sentence("studio"), "remedy": one.advice("studio")}
 

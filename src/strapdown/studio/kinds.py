@@ -36,16 +36,7 @@ from strapdown.config.toml_text import Page, inline, string
 from strapdown.errors import DataError, Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.sensors.bridge import target_of
-from strapdown.studio.questions import (
-    FOOT,
-    HEIGHTS,
-    ROLES,
-    either_question,
-    foot_question,
-    of_each,
-    of_file,
-    role_question,
-)
+from strapdown.studio import questions
 
 
 @dataclass(frozen=True)
@@ -95,13 +86,13 @@ class Kind:
 
 
 def _log_table(path: Path, keys: Keys) -> LogTable:
-    own, _ = of_file(keys, None, path.as_posix())
-    return specify(LogTable, path=str(path), **of_each(own)[0])
+    own, _ = questions.of_file(keys, None, path.as_posix())
+    return specify(LogTable, path=str(path), **questions.of_each(own)[0])
 
 
 def _axes_of(path: Path, keys: Keys, axes: str | None) -> str | None:
     """Axes of a log, as stated of it alone or of all."""
-    return of_file(keys, axes, path.as_posix())[1]
+    return questions.of_file(keys, axes, path.as_posix())[1]
 
 
 @dataclass(frozen=True)
@@ -161,17 +152,17 @@ def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
         held[one["file"]][one["name"]] = {column["name"] for column in one["columns"]}
     asks = [(q["file"], q["key"]) for q in found["questions"] if not q.get("optional")]
     # An open question about heights is one about fixes.
-    of_fixes = {file for file, key in asks if key == HEIGHTS}
-    of_samples = {file for file, key in asks if key != HEIGHTS}
+    of_fixes = {file for file, key in asks if key == questions.HEIGHTS}
+    of_samples = {file for file, key in asks if key != questions.HEIGHTS}
     inertial = [name for name in own if "imu" in held[name] or name in of_samples]
     asked: list[dict[str, Any]] = []
 
     def one_of(role: str, names: list[str], none: str = "") -> str | None:
-        said = keys.get(ROLES[role])
+        said = keys.get(questions.ROLES[role])
         if said is not None and (said in own or said == ""):
             return said or None
         if len(names) > 1:
-            asked.append(role_question(role, names, none=none))
+            asked.append(questions.role_question(role, names, none=none))
         return names[0] if names else None
 
     samples = one_of("samples", inertial) or next(iter(own))
@@ -187,8 +178,8 @@ def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
         # A trajectory is fixes, too, if one reads its positions alone: where there are no others.
         with_fixes = [n for n in (samples, *others) if "gnss" in held[n] or n in of_fixes]
         plain = [name for name in with_fixes if name == samples or name not in references]
-        if not plain and len(with_fixes) == 1 and ROLES["fixes"] not in keys:
-            asked.append(either_question(with_fixes[0]))
+        if not plain and len(with_fixes) == 1 and questions.ROLES["fixes"] not in keys:
+            asked.append(questions.either_question(with_fixes[0]))
         fixes = one_of("fixes", plain or with_fixes)
     if kind in COMPARED:
         left = [name for name in references if name != fixes or name == samples]
@@ -226,17 +217,17 @@ def _draft_navigation(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]
         return [Draft("", choose=roles.asked)]
     log = roles.samples
     fixes = None if roles.fixes == log else roles.fixes
-    of_fixes = of_each(of_file(keys, None, (fixes or log).as_posix())[0])[1]
+    of_fixes = questions.of_each(questions.of_file(keys, None, (fixes or log).as_posix())[0])[1]
     axes = _axes_of(log, keys, axes)
     known = fixes is not None or of_fixes
     gnss = specify(FixesTable, path=str(fixes or log), **of_fixes) if known else None
     truth = roles.reference
     table = _log_table(log, keys)
-    foot = bool(keys.get(FOOT))
+    foot = bool(keys.get(questions.FOOT))
     made = draft_navigation(table, folder=Path(), axes=axes, gnss=gnss, truth=truth, foot=foot)
     # Whoever walks with a receiver is followed by its fixes.
     ask = foot or roles.fixes is None
-    return [replace(_drafted(made, roles), again=(foot_question(foot),) if ask else ())]
+    return [replace(_drafted(made, roles), again=(questions.foot_question(foot),) if ask else ())]
 
 
 def _draft_alignment(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
@@ -281,10 +272,10 @@ def _draft_crash(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
     unused = (*(error.finding for error in unread), *unused_files(paths, seen))
     stated, beside = {}, []
     for record in records:
-        own, own_axes = of_file(keys, axes, record.path.as_posix())
+        own, own_axes = questions.of_file(keys, axes, record.path.as_posix())
         taken = {k: str(own[k]) for k in ("accel_unit", "gyro_unit") if k in own}
         stated[record.path] = StatedReading(axes=own_axes or "", **taken)
-        if left := [k for k in of_each(own)[0] if k not in taken and k not in PART]:
+        if left := [k for k in questions.of_each(own)[0] if k not in taken and k not in PART]:
             name = record.path.as_posix()
             beside.append(Finding("studio.reading-not-used", file=name, data={"keys": left}))
     begin, end = keys.get("from_s"), keys.get("to_s")
@@ -451,7 +442,7 @@ def _draft_of_options(table: str, what: str, example: Iterable[tuple[str, str, s
         page.table(f"[{table}]")
         for key, value, remark in example:
             page.key(key, value, remark)
-        alike = of_file(keys, axes, first.as_posix())
+        alike = questions.of_file(keys, axes, first.as_posix())
         apart = [] if table == "attitude" else others
         findings = [
             Finding(
@@ -460,7 +451,7 @@ def _draft_of_options(table: str, what: str, example: Iterable[tuple[str, str, s
                 data={"first": first.as_posix()},
             )
             for one in apart
-            if of_file(keys, stated_axes, one.as_posix()) != alike
+            if questions.of_file(keys, stated_axes, one.as_posix()) != alike
         ]
         found = []
         if roles.reference is not None and not roles.within:

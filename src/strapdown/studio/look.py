@@ -27,6 +27,7 @@ from strapdown.config.logs import DoctorSpec, FixesTable, LogTable
 from strapdown.config.spec import specify
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
+from strapdown.formats import files_of, open_stream, read_raw, reader_of
 from strapdown.studio.folder import Folder, is_recording, plain_name
 from strapdown.studio.pyramid import LIST, write_stream
 from strapdown.studio.questions import (
@@ -216,7 +217,6 @@ def _read_of(folder: Path, _: str) -> frozenset[Path]:
 
     Of a crash with those it names.
     """
-    from strapdown.formats import files_of, read_raw, reader_of
     from strapdown.formats.crash_records import read_crash_record, stated_format
 
     own: Sequence[Path] = [folder]
@@ -253,7 +253,6 @@ def files_of_recorders(paths: Sequence[Path]) -> list[Path]:
 @lru_cache(maxsize=256)
 def _recordings_in(folder: Path, _: str) -> Sequence[Path]:
     """Recordings of a folder of this digest, which is opened once and not for each look."""
-    from strapdown.formats import open_stream
     from strapdown.formats.crash_records import stated_format
 
     # A file of a folder in a folder has no name in the studio.

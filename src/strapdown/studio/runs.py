@@ -34,13 +34,17 @@ from strapdown.bundle import (
     resolved,
     sha256,
 )
+from strapdown.config.logs import FixesTable
+from strapdown.config.spec import specify
 from strapdown.constants import Array
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
+from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.navigation.heading_integrity import STATUSES
 from strapdown.studio.folder import Folder, repeating
 from strapdown.studio.kinds import KINDS
 from strapdown.studio.look import kept_stream
 from strapdown.studio.pyramid import LIST
+from strapdown.tables import EULER, QUATERNION
 from strapdown.tables.checks import find_gaps, index_of
 
 if TYPE_CHECKING:
@@ -449,7 +453,6 @@ def _known_attitude(place: Path, manifest: Mapping[str, Any], time: Array) -> di
     from strapdown.attitude_comparison.options import AttitudeSpec
     from strapdown.attitude_comparison.source import read_source, with_truth
     from strapdown.evaluation.differences import attitude_at
-    from strapdown.tables import EULER, QUATERNION
 
     stated = {k: v for k, v in manifest["configuration"].items() if k != "report"}
     # A file that a manifest names elsewhere is not read.
@@ -536,8 +539,6 @@ def _input(place: Path, path: str, manifest: Mapping[str, Any]) -> Path:
 
 def _fixes(place: Path, manifest: Mapping[str, Any], points: int) -> dict[str, Any] | None:
     """Return the fixes that the run used, if it has a copy."""
-    from strapdown.config.logs import FixesTable
-    from strapdown.config.spec import specify
     from strapdown.formats.gnss_files import read_gnss
 
     aids = manifest["configuration"].get("navigation", {}).get("aiding", {})
@@ -554,8 +555,6 @@ def _fixes(place: Path, manifest: Mapping[str, Any], points: int) -> dict[str, A
 
 def _reference(place: Path, manifest: Mapping[str, Any], points: int) -> dict[str, Any] | None:
     """Return the reference trajectory of the run, if it has a copy."""
-    from strapdown.formats.trajectory_readers import read_trajectory
-
     truth = manifest["configuration"].get("navigation", {}).get("truth")
     if not isinstance(truth, dict) or not truth.get("path"):
         return None

@@ -16,6 +16,7 @@ import pandas as pd
 from strapdown.bundle import InputFiles, Seal, check_destination, input_files, with_paths
 from strapdown.config.reading import FileSpec
 from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats import csv
 from strapdown.formats.recording import ReadOptions
 from strapdown.lazy_names import named
 from strapdown.progress import Progress, silent
@@ -191,7 +192,6 @@ class Memory:
         if not self.tables:
             yield NOWHERE
             return
-        from strapdown.formats import csv
         from strapdown.formats.writers import WRITERS, table_columns, table_comments
 
         with tempfile.TemporaryDirectory(prefix="strapdown-") as name:

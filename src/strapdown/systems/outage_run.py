@@ -25,6 +25,7 @@ from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import stated_states
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown
+from strapdown.navigation import outage_test
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.measurement import Measurement
 from strapdown.navigation.navigator import Navigator, NavigatorState, with_states
@@ -38,17 +39,6 @@ from strapdown.navigation.outage import (
     physical,
     variances,
     with_physical,
-)
-from strapdown.navigation.outage_test import (
-    SETTLED,
-    OutageVerdict,
-    WithheldRun,
-    WithheldScore,
-    blinded,
-    judge_outages,
-    score_of,
-    spans_to_withhold,
-    withheld_runs,
 )
 from strapdown.navigation.pipeline import NavigationPipeline, PipelineState
 from strapdown.navigation.record import NavigationChunk, Span, state_of_row
@@ -117,10 +107,10 @@ class OutageRun(SavedRun):
         return _equal(self.drifts)
 
     @property
-    def verdict(self) -> OutageVerdict | None:
+    def verdict(self) -> outage_test.OutageVerdict | None:
         """Agreement of the drifts of `equal` with their bounds; None without fixes."""
         scores = [drift.score for drift in self.equal if drift.score is not None]
-        return judge_outages(scores) if scores else None
+        return outage_test.judge_outages(scores) if scores else None
 
     @property
     def cone(self) -> tuple[Array, Array, dict[str, Array]]:
@@ -288,7 +278,7 @@ class Drift:
     along: Array
     across: Array
     down: Array
-    score: WithheldScore | None = None
+    score: outage_test.WithheldScore | None = None
     rejected: int = 0
     since_fix: float = 0.0
     whole: bool = True
@@ -349,7 +339,7 @@ def outage_of_run(
     spans = _spans(spec, source, float(begun.time), min([float(time[-1]), *ends]), receivers)
     blind = chain
     for name in receivers:
-        blind = replace(blind, navigator=blinded(blind.navigator, name))
+        blind = replace(blind, navigator=outage_test.blinded(blind.navigator, name))
     fixes = _Fixes(
         receivers,
         float(begun.time),
@@ -358,8 +348,10 @@ def outage_of_run(
             default=0.0,
         ),
     )
-    runs: list[WithheldRun] = []
-    for run in withheld_runs(chain, blind, begun, time[at:], values[at:], spans, fixes.take):
+    runs: list[outage_test.WithheldRun] = []
+    for run in outage_test.withheld_runs(
+        chain, blind, begun, time[at:], values[at:], spans, fixes.take
+    ):
         progress(f"outage {len(runs) + 1} of {len(spans)}", 0.1 + 0.4 * len(runs) / len(spans))
         runs.append(run)
     grid = np.linspace(0.0, spec.outage_s, INSTANTS + 1)
@@ -419,10 +411,10 @@ def _spans(
     spec: OutageSpec, source: NavigationSource, begun: float, end: float, receivers: list[str]
 ) -> tuple[Span, ...]:
     """The outages, on the clock of the samples."""
-    first = begun + SETTLED
+    first = begun + outage_test.SETTLED
     check_part(spec.from_s, spec.to_s, spec.duration_s)
     if spec.at_s is not None:
-        if not first - SETTLED <= spec.at_s <= end - spec.outage_s:
+        if not first - outage_test.SETTLED <= spec.at_s <= end - spec.outage_s:
             raise ConfigError(
                 "outage.outage-not-within-run-navigation"
                 if end - spec.outage_s > begun
@@ -466,10 +458,12 @@ def _spans(
             room_2=room,
         )
     places = spec.places if receivers else 1
-    return spans_to_withhold(*within, spec.outage_s, places)
+    return outage_test.spans_to_withhold(*within, spec.outage_s, places)
 
 
-def _drift(navigator: Navigator, run: WithheldRun, span: Span, fixes: _Fixes, grid: Array) -> Drift:
+def _drift(
+    navigator: Navigator, run: outage_test.WithheldRun, span: Span, fixes: _Fixes, grid: Array
+) -> Drift:
     """Predicted and measured drift of an outage."""
     if run.state.navigator is None or run.through.navigator is None:
         raise _aligns_anew(span.begin, span.end)
@@ -500,7 +494,7 @@ def _drift(navigator: Navigator, run: WithheldRun, span: Span, fixes: _Fixes, gr
     position = f"{fixes.scored}.position"
     if not any(one.name == position for piece in run.pieces for one in piece.seen.by_name()):
         return empty
-    score: WithheldScore = score_of(run.pieces, fixes.scored, span)
+    score: outage_test.WithheldScore = outage_test.score_of(run.pieces, fixes.scored, span)
     sound = score.without(np.concatenate([none, *fixes.rejected]))
     at = sound.time
     empty = replace(empty, rejected=len(score.time) - len(at))
