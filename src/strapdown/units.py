@@ -196,7 +196,8 @@ _SPELLINGS = {
     "mrad/s": "mrad/s",
     "deg/s": "deg/s град/с град/сек °/с °/сек "
     "deg/sec degs degps dps °/s °/sec º/s º/sec degree/s degree/sec degrees/s "
-    "degrees/sec deg/second degree/second degrees/second degsec grad/s d/s",
+    "degrees/sec deg/second degree/second degrees/second degsec grad/s d/s "
+    "grader/s graden/s gradi/s grados/s graus/s derece/s",
     "mdeg/s": "mdeg/s mdps",
     "deg/h": "deg/h deg/hr °/h °/hr º/h dph deg/hour degrees/hour",
     "rpm": "rpm r/min rev/min revs/min tr/min u/min 1/min turns/min turn/min min^-1 min-1 об/мин",

@@ -200,6 +200,11 @@ READERS: dict[str, Reader] = {
     "vbo": Reader.of(loggers, name="vbo"),
     "flysight": Reader.of(loggers, name="flysight"),
     "gyroflow": Reader.of(loggers, name="gyroflow"),
+    "can": Reader(
+        "messages of a CAN bus",
+        loggers.detect_can,
+        dict.fromkeys(("imu", "gnss", "reference"), loggers.refuse_can),
+    ),
     "microstrain": Reader.of(imu_makers, name="microstrain"),
     "apdm": Reader.of(imu_makers, name="apdm"),
     "x-imu3": Reader.of(imu_makers, "x-IMU3: CSV, folder", name="xio"),
@@ -358,7 +363,7 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
                     # Of a folder, with those of the stream itself.
                     own = tuple(file for file in raw.files if file.is_file())
                     raw.files = tuple(dict.fromkeys((*reader.files(path), *own))) or raw.files
-                if isinstance(raw, RawLog) and key == TABLE and stream == "imu":
+                if isinstance(raw, RawLog) and stream == "imu" and not raw.stated:
                     raw = of_one_sensor(raw)
                 if isinstance(raw, RawLog) and stream == "gnss" and raw.fixes is not None:
                     raw = raw.fixes  # a section of its own

@@ -22,7 +22,7 @@ _DATE = r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}"
 _STAMP = re.compile(
     rf"(?:(?P<date>{_DATE})(?:[T,]|[ T,] ?))?"
     r"(?P<h>\d{1,2}):(?P<m>[0-5]?\d):(?P<s>[0-5]?\d)(?:[.,:](?P<part>\d{1,9}))?"
-    r" ?(?:(?P<half>[AP])\.? ?M\.?|Z|UTC|GMT|(?P<zone>[+-]\d\d:?\d\d))?",
+    r" ?(?:(?P<half>[AP])\.? ?M\.?|Z|(?:UTC|GMT)?(?P<zone>[+-]\d\d:?\d\d)|UTC|GMT)?",
     re.I,
 )
 # The basic form of ISO 8601: 20260304T091530.250Z; and minutes and seconds: 15:30.250.
@@ -37,6 +37,14 @@ _CTIME = re.compile(
     r"(\d\d:\d\d:\d\d(?:\.\d+)?) (?:UTC |GMT )?(\d{4})",
     re.I,
 )
+# As browsers write it: Wed Dec 22 2021 21:09:46 GMT+0100 (Central European Standard Time).
+_BROWSER = re.compile(
+    rf"(?:mon|tue|wed|thu|fri|sat|sun) ({'|'.join(_MONTHS)}) (\d\d) (\d{{4}}) "
+    r"(\d\d:\d\d:\d\d(?:\.\d+)? GMT[+-]\d{4})(?: \(.*\))?",
+    re.I,
+)
+# A duration of pandas, of which the days are those of the clock: 0 days 00:00:00.01.
+_DURATION = re.compile(r"\d+ days? (\d\d:\d\d:\d\d(?:\.\d{1,9})?)")
 # A month in letters: 22-May-2015 07:00:25.730.
 _NAMED_MONTH = re.compile(
     rf"(\d{{1,2}})[-/ ]({'|'.join(_MONTHS)})[a-z]*[-/ ](\d{{4}}|\d\d)(?!\d)", re.I
@@ -89,6 +97,10 @@ def _plain(field: str) -> str:
         return f"0:{field}"
     if (m := _CTIME.fullmatch(field)) is not None:
         return f"{m[4]}-{_MONTHS.index(m[1].lower()) + 1}-{m[2]} {m[3]}"
+    if (m := _BROWSER.fullmatch(field)) is not None:
+        return f"{m[3]}-{_MONTHS.index(m[1].lower()) + 1}-{m[2]} {m[4]}"
+    if (m := _DURATION.fullmatch(field)) is not None:
+        return m[1]
     m = _NAMED_MONTH.match(field)
     if m is None:
         return field

@@ -37,6 +37,7 @@ from strapdown.formats.find_columns import (
     find_columns,
     is_of_series,
     names_of_fixes,
+    names_of_velocities,
     reference,
     steady_triads,
     unit_stated,
@@ -275,32 +276,58 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     )
 
 
+#: Share by which the length of gravity varies, and of it the most that is left in an acceleration
+#: without gravity, as a median.
+STEADY, LEFT = 0.02, 0.2
+
+
+def _of_names(raw: RawLog, axes: Mapping[str, str]) -> Array:
+    return np.column_stack([raw.columns[axes[a]].astype(np.float64) for a in AXES])
+
+
+def _is_beside_gravity(gravity: Array, accel: Array) -> bool:
+    """Whether vectors are gravity, and accelerations beside it have none."""
+    size = np.linalg.norm(gravity, axis=1)
+    usual = float(np.nanmedian(size))
+    if not usual > 0.0 or np.nanmean(np.abs(size - usual) > STEADY * usual) > STEADY:
+        return False
+    along = np.einsum("ij,ij->i", gravity, accel) / usual
+    return bool(abs(float(np.nanmedian(along))) < LEFT * usual)
+
+
 def _with_force_of_parts(raw: RawLog, options: ReadOptions) -> RawLog:
     """Return a log whose force is linear acceleration plus gravity, where it has no other.
 
     Both as phones write them, in one unit. A name of Core Motion, user acceleration, is left: its
-    sign is a question of its own.
+    sign is a question of its own. Acceleration whose name does not say it is without gravity is
+    so where gravity beside it is as long all the time, and is not in it.
     """
     if raw.stated or any(q.startswith("accel") for q in options.columns):
         return raw
     parts: dict[bool, dict[str, str]] = {True: {}, False: {}}
+    named = True
     for name, column in raw.columns.items():
         said = read_name(name)
         triad, _, axis = str(said.quantity).partition("_")
         if triad not in ("accel", "gravity") or not axis:
             continue
         is_gravity = triad == "gravity"
-        if not (is_gravity or said.linear) or axis in parts[is_gravity]:
-            return raw  # an accelerometer of its own, or one that is there twice
+        if axis in parts[is_gravity]:
+            return raw  # one that is there twice
         if "user" in said.family or column.dtype.kind not in "iuf":
             return raw
         parts[is_gravity][axis] = name
+        named &= is_gravity or said.linear
     gravity, linear = parts[True], parts[False]
     names = [*linear.values(), *gravity.values()]
     units = {unit_stated(raw, name) for name in names}
     if not len(gravity) == len(linear) == len(AXES) or len(units) != 1:
         return raw
-    columns = {name: column for name, column in raw.columns.items() if name not in names}
+    if not (named or _is_beside_gravity(*(_of_names(raw, part) for part in (gravity, linear)))):
+        return raw  # an accelerometer of its own
+    # Short names of gravity are those of Core Motion: they leave the sign open (`APPLE`).
+    used = names if named else linear.values()
+    columns = {name: column for name, column in raw.columns.items() if name not in used}
     sums = {f"accel_{a}": raw.columns[linear[a]] + raw.columns[gravity[a]] for a in AXES}
     unit = units.pop()
     stated = dict.fromkeys(sums, unit) if unit else {}
@@ -482,7 +509,12 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
     others = {*names_of_fixes(raw), *names_of_wheels(raw)}
     if not (names := [name for name in names if name not in others]):
         return []
-    out = [Finding("io.columns-not-used", file=raw.name, severity="note", names=names)]
+    out: list[Finding] = []
+    if velocities := names_of_velocities(raw):
+        add_note(out, "io.velocities-in-log", file=raw.name, names=velocities)
+        names = [name for name in names if name not in velocities]
+    if names:
+        add_note(out, "io.columns-not-used", file=raw.name, names=names)
     clocks = [n for n in names if _is_clock(n)]
     if clocks and "time" in found and not raw.stated:
         add_note(
@@ -740,7 +772,8 @@ def _stamps_of_log(
     column, inferred = log.found["time"], log.said.get("time_unit")
     open_unit = column.unit is None and column.basis != "file" and not (dated or options.time_unit)
     if rate is not None and open_unit and is_count(ticks):
-        log.note("io.time-from-counter", "time", source=column.source, rate=rate, lost=0)
+        lost = int(ticks[-1] - ticks[0]) + 1 - ticks.size
+        log.note("io.time-from-counter", "time", source=column.source, rate=rate, lost=lost)
         why = f"samples as numbered by {column.source!r}, {rate:g} Hz as stated"
         return read_stamps((ticks if rows is None else ticks[rows]) / rate, "s", why, **where)
     if options.rate is not None:

@@ -237,11 +237,17 @@ def on_clock_of(
     """
     own, other = clock_of(table), clock_of(imu)
     file = source or table.attrs.get("source")
-    if RELATIVE in (own.name, other.name):
-        return table, None
     time = table.index.to_numpy(dtype=np.float64)
+    name, ahead, kind = table.attrs.get("other_clock", ("", 0.0, ""))
+    data: dict[str, Any] = {}
     absolute = time + own.origin
-    if own.name == other.name == UNIX:
+    begin, end = imu.index[[0, -1]] + other.origin - ahead
+    if kind == other.name != own.name and absolute[0] <= end and begin <= absolute[-1]:
+        shift, code = own.origin + ahead - other.origin, "io.time-of-other-clock"
+        data["source"] = name
+    elif RELATIVE in (own.name, other.name):
+        return table, None
+    elif own.name == other.name == UNIX:
         shift, code = own.origin - other.origin, "io.time-from-1970-shifted"
     elif own.name == other.name:
         weeks = 0.0 if None in (own.week, other.week) else WEEK * (own.week - other.week)  # type: ignore[operator]
@@ -264,7 +270,7 @@ def on_clock_of(
     out.attrs = {**table.attrs, "clock": other.name, "clock_origin": other.origin}
     out.attrs["clock_origin_stamp"] = imu.attrs.get("clock_origin_stamp")
     out.attrs["gps_week"] = other.week
-    return out, Finding(code, file=file, quantity="time", severity="note", shift=shift)
+    return out, Finding(code, file=file, quantity="time", severity="note", shift=shift, **data)
 
 
 # Samples that are numbered.
@@ -301,12 +307,15 @@ def counted(columns: Mapping[str, NDArray[Any]]) -> tuple[str, NDArray[np.int64]
 
 
 def is_count(stamps: NDArray[Any]) -> bool:
-    """Whether stamps are whole numbers of which each is that before plus one.
+    """Whether stamps are growing whole numbers of which each is most often that before plus one.
 
-    They number the samples as well as they are a clock of one tick a sample.
+    They number the samples, of which some may be lost, as well as they are a clock of one tick.
     """
-    whole = stamps.dtype.kind in "iuf" and stamps.size > 1 and float(stamps[0]).is_integer()
-    return whole and bool((np.diff(stamps) == 1).all())
+    if stamps.dtype.kind not in "iuf" or stamps.size < 2 or not float(stamps[0]).is_integer():
+        return False
+    steps = np.diff(stamps.astype(np.float64))
+    whole = (steps >= 1) & (steps == np.floor(steps))
+    return bool(whole.all()) and 2 * int((steps == 1).sum()) > steps.size
 
 
 # Stamps that are coarser than the samples.

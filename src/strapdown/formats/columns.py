@@ -15,6 +15,7 @@ from strapdown.formats.vocabularies import (
     AXIS_WORDS,
     BESIDE,
     BY_UNIT,
+    CAMERA,
     CHANGE,
     CHIP,
     CLOCKS,
@@ -161,6 +162,9 @@ def _read_name(name: str, of: Vocabulary, unit: str) -> ColumnName:
         return code
     if not of.sensors and len(text) <= LONGEST:
         text = _HEMISPHERE.sub(r"\1", text)
+    if of.sensors and "/" in text:
+        for words, axis in CAMERA.items():
+            text = text.replace(words, axis)
     said = _of_format(text, index) if of.sensors else None
     inside = _UNIT_INSIDE.fullmatch(text) if of.sensors else None
     if inside and find_unit(inside[2], of.kinds):

@@ -266,12 +266,23 @@ def _filled(fields: list[str]) -> list[str]:
     return out
 
 
+#: Axes in a name, in the order of the columns that it stands over.
+_LISTED = re.compile(r"\(([xyz]),([xyz]),([xyz])\)")
+
+
 def of_arrays(names: list[str]) -> list[str]:
-    """Number the values of a sensor of which the first alone has its name: ``Gyro, 1, 2``."""
+    """Name the values of a sensor of which the first alone has its name: ``Gyro, 1, 2``.
+
+    They are numbered, or have the axes that the name lists: ``Gyro (z,x,y), 1, 2``.
+    """
     out = list(names)
     for k, name in enumerate(names):
         numbered = names[k + 1 : k + 3] == ["1", "2"] and names[k + 3 : k + 4] != ["3"]
-        if numbered and read_name(name).quantity in TRIADS:
+        listed = _LISTED.search(name) if numbered else None
+        if listed and set(listed.groups()) == {*"xyz"}:
+            bare = name[: listed.start()], name[listed.end() :]
+            out[k : k + 3] = [f"{bare[0]}({axis}){bare[1]}" for axis in listed.groups()]
+        elif numbered and read_name(name).quantity in TRIADS:
             out[k : k + 3] = [f"{name}[{j}]" for j in range(3)]
     return out
 
@@ -470,6 +481,9 @@ def _at_once(
         rows = [*enumerate(before.split("\n"))][-20:]
         if size <= HEAD or _was_cut(last, rows, top, ended=False):
             return None
+    seen = [line for _, line in top.data] + tail.decode("latin-1").split("\n")[1:]
+    if _mark_of_groups(seen, top.separator):
+        return None
     columns = columns_at_once(source, len(top.names), top.separator, start)
     # A line of text between rows makes text of every column.
     if columns is None or all(c.dtype.kind == "O" for c in columns):
@@ -500,6 +514,9 @@ def _line_by_line(
     rows, lines = _whole_lines(top, ended, name, findings)
     if (several := _in_blocks(rows, top, name)) is not None:
         findings.append(several)
+    if mark := _mark_of_groups(lines, top.separator):
+        lines = [_GROUPS[mark].sub(lambda m: m[0].replace(mark, ""), line) for line in lines]
+        add_note(findings, "io.thousands-grouped", file=name, row=rows[0], mark=mark)
     columns = _parse(lines, len(top.names), top.separator, name)
     clock = _clock(top.names, columns)
     if clock is not None and len(columns[clock]) > 1 and step_range(columns[clock])[0] < 0.0:
@@ -515,6 +532,38 @@ def _line_by_line(
             )
             findings.append(finding)
     return _log(top, name, files, columns, np.array(rows), findings)
+
+
+#: Numbers whose thousands a mark groups, with decimals behind the other; lines that are looked at,
+#: and fewest grouped numbers and others that show it.
+_GROUPS = {
+    mark: re.compile(rf"(?<![\d.,])-?[1-9]\d{{0,2}}(?:\{mark}\d{{3}})+(?:\{other}\d+)?(?![\d.,])")
+    for mark, other in ((".", ","), (",", "."))
+}
+_LOOKED_AT, _LEAST_GROUPED = 400, 20
+
+
+def _mark_of_groups(lines: Sequence[str], separator: str | None) -> str:
+    """Return the mark that groups thousands, 1.165 beside 146; empty if none does.
+
+    Every number with the mark is then of whole groups behind a digit that is no zero, and those
+    without it in the same columns have at most three digits before their decimals.
+    """
+    if separator not in (";", "\t"):
+        return ""
+    some = lines[:: max(1, len(lines) // _LOOKED_AT)]
+    rows = [[f.strip(' "') for f in line.split(separator)] for line in some]
+    columns = [[f for f in c if f[:1].isdigit() or f[:1] == "-"] for c in zip(*rows, strict=False)]
+    for mark, other in ((".", ","), (",", ".")):
+        fields = [f for c in columns if any(mark in f for f in c) for f in c]
+        grouped = [f for f in fields if mark in f]
+        if len(grouped) < _LEAST_GROUPED or not all(map(_GROUPS[mark].fullmatch, grouped)):
+            continue
+        plain = [f for f in fields if mark not in f and f.strip("-0")]
+        short = all(len(f.lstrip("-").partition(other)[0]) < 4 for f in plain)
+        if short and len(plain) >= _LEAST_GROUPED:
+            return mark
+    return ""
 
 
 def _clock(names: Sequence[str], columns: Columns) -> int | None:
@@ -912,12 +961,16 @@ def _one_row_a_stamp(
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
     """Put values that have a row each, under the name of their axis, into one row a stamp.
 
-    The names are in a column, ``gyro_x``, or in two, the sensor and its axis.
+    The names are in a column, ``gyro_x``, or in two, the sensor and its axis. Columns of one value
+    say nothing, as those of an export of InfluxDB.
     """
-    clocks = [n for n in held if read_name(n).quantity == "time"]
-    texts = [n for n, v in held.items() if v.dtype.kind == "O" and n not in clocks]
-    values = [n for n in held if n.strip().lower() in _VALUE_NAMES]
-    if len(clocks) != 1 or len(values) != 1 or len(texts) not in (1, 2) or len(held) > 5:
+    values = [n for n in held if n.strip(" _").lower() in _VALUE_NAMES]
+    if len(values) != 1:
+        return held, rows
+    vary = {n: v for n, v in held.items() if ((v != v[:1]) & (v == v)).any()}
+    clocks = [n for n in vary if read_name(n).quantity == "time"]
+    texts = [n for n, v in vary.items() if v.dtype.kind == "O" and n not in clocks]
+    if len(clocks) != 1 or len(texts) not in (1, 2) or len(vary) > 5:
         return held, rows
     words = [held[n].astype(str) for n in texts]
     names = words[0] if len(words) == 1 else np.char.add(np.char.add(words[0], " "), words[1])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from strapdown.constants import Array
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.formats.arrays import STEP_OF_FIXES, is_stamp, numbers, ticks_of
-from strapdown.formats.clocks import clock_of_name
+from strapdown.formats.clocks import clock_of_name, is_count
 from strapdown.formats.columns import (
     DELSYS_CLOCK,
     INDEXED,
@@ -536,7 +536,7 @@ def advances(values: NDArray[Any]) -> bool:
     steps: NDArray[Any] = np.diff(values.astype(np.int64) if whole else values.astype(np.float64))
     usual = float(np.median(steps))
     even = np.mean(np.abs(steps - usual) <= 0.5 * usual)
-    forward = bool((steps >= 0).all()) and not bool((steps == 1).all())
+    forward = bool((steps >= 0).all()) and not is_count(values)
     return usual > 0.0 and forward and bool(even > 0.9)
 
 
@@ -1071,9 +1071,17 @@ def _is_plain(name: str, read: Mapping[str, ColumnName], known: Mapping[str, Qua
     return len(alone) == 1 and (not said.unit or said.unit in known[str(said.quantity)].units)
 
 
+#: A unit behind the number of them that a count is: 0.01m.
+_SCALED = re.compile(r"(\d+(?:\.\d+)?(?:e-?\d+)?)\*?([^\d.].*)")
+
+
 def _factor(quantity: str, known: Quantity, unit: str | None, name: str, file: str) -> float:
     if unit is None:
         return 1.0
+    if unit == "ms" and "m/s" in known.units:
+        return known.units["m/s"]  # speed_ms
+    if (scaled := _SCALED.fullmatch(unit)) and scaled[2] in known.units:
+        return float(scaled[1]) * known.units[scaled[2]]
     if unit not in known.units:
         raise DataError(
             "io.unit-of-other-quantity",
@@ -1156,3 +1164,13 @@ def names_of_fixes(raw: RawLog) -> set[str]:
         return set()
     there = {"lat", "lon"} <= found.keys()
     return {column.source for column in found.values()} if there else set()
+
+
+def names_of_velocities(raw: RawLog) -> list[str]:
+    """Return the columns of a velocity north and east that are there without a position."""
+    try:
+        found = fix_columns(raw, {})
+    except StrapdownError:
+        return []
+    level = {"VN", "VE"} <= found.keys() and not {"lat", "lon", "north", "ecef_x"} & found.keys()
+    return [found[q].source for q in ("VN", "VE", "VD") if q in found] if level else []

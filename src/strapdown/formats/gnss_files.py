@@ -17,7 +17,14 @@ from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, ch
 from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import STEP_OF_FIXES, epoch_of, numbers, open_dates
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock
-from strapdown.formats.find_columns import Found, fix_columns, names_of_quantities, plain_name
+from strapdown.formats.columns import read_name
+from strapdown.formats.find_columns import (
+    Found,
+    fix_columns,
+    is_clock,
+    names_of_quantities,
+    plain_name,
+)
 from strapdown.formats.gnss_fixes import (
     NOWHERE,
     RADIUS,
@@ -352,6 +359,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         rows=np.arange(1, time.size + 1) if raw.rows is None else raw.rows,
         placed=not alone,
         clock=clock,
+        other_clock=_other_clock(raw, time, clock, options),
         velocity=velocity,
         position_sd=position_sd,
         velocity_sd=velocity_sd,
@@ -940,6 +948,36 @@ def _time(raw: RawLog, found: Found, stated: str | None) -> tuple[Array, Clock]:
             keys=f'units = {{time = "{unit}"}}',
         )
     return time, Clock(name)
+
+
+#: Largest difference of two clocks of the same fixes from one offset, s, as a median.
+_ONE_OFFSET = 0.1
+
+
+def _other_clock(
+    raw: RawLog, time: Array, clock: Clock, options: GnssOptions
+) -> tuple[str, float, str] | None:
+    """Return a clock of another kind beside that of the fixes: column, seconds ahead, kind.
+
+    The inertial sensors may be on it. `time` (s): by `clock`.
+    """
+    if "time" in options.columns or raw.stated or time.size < 2:
+        return None
+    for name in raw.columns:
+        said = read_name(name, FIXES)
+        if said.quantity != "time" or not is_clock(raw, name):
+            continue
+        for unit in [said.unit] if said.unit else ["s", "ms", "us", "ns"]:
+            try:
+                own, kind, _ = Found(name, TIME_UNITS.get(str(unit), 1.0), True).stamps(raw)
+            except DataError:
+                break
+            ahead = own - time
+            offset = float(np.nanmedian(ahead))
+            fits = float(np.nanmedian(np.abs(ahead - offset))) < _ONE_OFFSET
+            if fits and offset != 0.0 and RELATIVE in (kind, clock.name) and kind != clock.name:
+                return name, offset, kind
+    return None
 
 
 def _quality(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]) -> Array | None:

@@ -116,6 +116,8 @@ class Fixes:
     #: Whether the file measures positions; else `place` is the origin that the user states.
     placed: bool = True
     clock: Clock = field(default_factory=lambda: Clock(RELATIVE))
+    #: Column of a clock of another kind, by how much it is ahead, s, and its kind.
+    other_clock: tuple[str, float, str] | None = None
     #: `velocity`, `position_sd`, `velocity_sd`: (n, 3): north, east, down.
     velocity: Array | None = None
     position_sd: Array | None = None
@@ -219,6 +221,8 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
         table["satellites"] = fixes.satellites[at]
     with_clock(table, fixes.clock)
     table.attrs["findings"] = tuple(fixes.findings)
+    if fixes.other_clock is not None:
+        table.attrs["other_clock"] = fixes.other_clock
     table.attrs.update(taken)
     if not fixes.placed:
         table.attrs[ORIGIN_STATED] = True
@@ -356,6 +360,10 @@ def _placed(fixes: Fixes, quality: Array, options: GnssOptions) -> NDArray[np.bo
     _say_left_out(fixes, ~zero, "io.fixes-at-zero-left-out")
     there = np.asarray(np.isfinite(fixes.place).all(axis=1))
     bad = np.flatnonzero(~there & (quality != 0.0))
+    # A row with a stamp alone is of no fix, as where other sensors have rows of their own.
+    values = [v for v in (fixes.place, fixes.velocity) if v is not None]
+    empty = np.isnan(np.hstack(values)).all(axis=1) & np.isfinite(fixes.time)
+    bad = bad if empty.all() else bad[~empty[bad]]
     if bad.size and not options.repair:
         k = int(bad[0])
         which = GEODETIC[int(np.argmin(np.isfinite(fixes.place[k])))]

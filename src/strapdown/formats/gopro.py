@@ -33,6 +33,7 @@ from strapdown.formats.join import join
 from strapdown.formats.known_formats import from_json, lacking
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, first_bytes, head, json_beginning
+from strapdown.formats.vocabularies import CAMERA
 from strapdown.tables.checks import Array
 from strapdown.units import unit_of
 
@@ -52,8 +53,6 @@ TYPES = {
 SENSORS = {"GYRO": "gyro", "ACCL": "accel", "MAGN": "mag"}
 DAYS_2000 = 946_684_800.0  # 2000-01-01 in seconds since 1970
 _BRACKETS = re.compile(r"\(\s*([xyz])\s*,\s*([xyz])\s*,\s*([xyz])\s*\)", re.I)
-# The order of HERO5, as its streams are named.
-_WORDS = {"up/down": "z", "right/left": "x", "forward/back": "y"}
 
 
 @dataclass
@@ -137,7 +136,7 @@ def _sensor(path: Path, key: str, one: Stream) -> RawLog:
     """Return one sensor about the axes of the camera."""
     triad, values = SENSORS[key], np.concatenate(one.values)
     name = str(one.said.get("STNM", ""))
-    for words, axis in _WORDS.items():
+    for words, axis in CAMERA.items():
         name = name.replace(words, axis)
     named = _BRACKETS.search(name)
     order = str(one.said.get("ORIN", "")) or ("".join(named.groups()).upper() if named else "")

@@ -122,6 +122,8 @@ def lacking(path: Path, stream: str, title: str, streams: Iterable[str]) -> Data
 _OF_SENSORS = {
     *("i", "id", "instance", "imu", "imuid", "sensor", "sensorid", "sensorindex", "sensornumber"),
     *("device", "deviceid", "devicename", "unit", "unitid", "node", "nodeid", "board", "address"),
+    *("mac", "macaddress", "serial", "serialnumber", "sensorname", "imuname", "tag", "tagid"),
+    *("side", "bodypart", "placement", "sensorlocation", "sensorposition"),
 }
 #: And of one that says the kind of a row's sensor.
 _OF_KINDS = {"sensortype", "typeofsensor", "kind", "type", "attribute"}
@@ -157,12 +159,22 @@ def _in_turns(sensors: NDArray[np.str_]) -> bool:
 
 
 def of_one_sensor(raw: RawLog) -> RawLog:
-    """Keep the rows of the first of several sensors, with a warning; the same log if it has one."""
-    if all(read_name(name).quantity != "gyro_x" for name in raw.columns):
+    """Keep the rows of the first of several sensors, with a warning; the same log if it has one.
+
+    DataError: the rows are of sensors of several kinds, in the columns of one.
+    """
+    there = {read_name(name).quantity for name in raw.columns}
+    if "gyro_x" not in there:
         return raw
-    for name, texts, counts in _in_turn_by(raw, _OF_SENSORS):
+    for name, texts, counts in _in_turn_by(raw, _OF_SENSORS | _OF_KINDS):
         if not _all_have_rates(raw, texts):
             continue
+        said = {read_name(f"{text} x").quantity for text in counts if text[1:]} - {None}
+        of_kinds = _plain(name) in _OF_KINDS
+        if of_kinds and len(said) < 2 and np.sum(texts[1:] != texts[:-1]) < len(counts):
+            continue  # one block each is a kind of motion, too
+        if len(said) > 1 or (of_kinds and "accel_x" not in there):
+            raise _kinds_in_turn(raw, name, counts)
         first = str(texts[0])
         finding = Finding(
             "io.rows-of-several-sensors",
@@ -193,9 +205,17 @@ def rows_of_kinds(raw: RawLog, *, asked: bool) -> DataError | None:
     # A number of a packet's sample is in turns, too: it is not of kinds.
     words = _OF_KINDS if asked else _OF_SENSORS | _OF_KINDS
     for name, _, counts in _in_turn_by(raw, words):
-        kinds = [f"{kind} ({n} rows)" for kind, n in counts.items()]
-        return raw.fault("io.rows-of-kinds", name=name, kinds=kinds)
+        return _kinds_in_turn(raw, name, counts)
     return None
+
+
+def _kinds_in_turn(raw: RawLog, name: str, counts: Mapping[str, int]) -> DataError:
+    kinds = [f"{kind} ({n} rows)" for kind, n in counts.items()]
+    return raw.fault("io.rows-of-kinds", name=name, kinds=kinds)
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
 def _in_turn_by(
@@ -203,15 +223,16 @@ def _in_turn_by(
 ) -> Iterator[tuple[str, NDArray[np.str_], dict[str, int]]]:
     """Yield columns whose values tell sensors apart that are read in turns, with their counts."""
     for name, values in raw.columns.items():
-        plain = re.sub(r"[^a-z0-9]", "", name.lower())
-        if plain not in words or values.dtype.kind not in "iuO":
+        if _plain(name) not in words or values.dtype.kind not in "iuO":
             continue
         texts = values.astype(str)
         sensors, counts = np.unique(texts, return_counts=True)
         changes = np.count_nonzero(texts[1:] != texts[:-1])
         if not 1 < sensors.size <= MOST_SENSORS or counts.min() < FEWEST:
             continue
-        if changes >= CHANGES * texts.size and _in_turns(texts):
+        # Words tell sensors apart whose rows follow each other in one block each, too.
+        blocks = values.dtype.kind == "O" and changes == sensors.size - 1
+        if blocks or (changes >= CHANGES * texts.size and _in_turns(texts)):
             yield name, texts, dict(zip(map(str, sensors), map(int, counts), strict=True))
 
 

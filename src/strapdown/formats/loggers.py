@@ -201,3 +201,20 @@ def _positive(text: str) -> float | None:
     except ValueError:
         return None
     return value if 0.0 < value < np.inf else None
+
+
+# Messages of a CAN bus, whose signals only its database (.dbc) tells apart: candump of can-utils
+# (both forms), ``.asc`` of Vector, ``.trc`` of PEAK, BUSMASTER, CSV of python-can and SavvyCAN.
+
+
+detect_can = Signs(
+    text=r"(?i)\A(?:\s*(?:\([\d.:\- ]+\)\s+)?[a-z]+\d+\s+[0-9A-F]{3,8}(?:#|\s+\[\d+\])"
+    r"|date .*\s+base (?:hex|dec)|;\$FILEVERSION|\*{3}BUSMASTER"
+    r"|time ?stamp,(?:arbitration_)?id,extended)"
+)
+
+
+def refuse_can(path: Path) -> RawLog:
+    """Refuse messages whose signals are not decoded."""
+    what, way = "a log of a CAN bus", "its signals, decoded by cantools or asammdf, as CSV"
+    raise DataError("io.foreign-format", file=path.name, what=what, way=way)

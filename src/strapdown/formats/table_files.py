@@ -6,6 +6,7 @@ import csv as text_csv
 import dataclasses
 import io
 import json
+import re
 import tempfile
 from collections.abc import Mapping
 from datetime import datetime, time
@@ -202,7 +203,9 @@ def _form(text: str) -> str:
         return "streams"
     if isinstance(value, list):
         first = value[0] if value else None
-        return "objects" if isinstance(first, dict) else "rows" if _begins_plain(first) else ""
+        if isinstance(first, dict) or _rejoined(value) is not None:
+            return "objects"
+        return "rows" if _begins_plain(first) else ""
     if not isinstance(value, dict):
         return ""
     held = value.get("payload")
@@ -294,6 +297,11 @@ detect_json = Signs(suffixes=(*JSON_SUFFIXES, ".txt", ".log"), text=r"\A\s*+[\[{
 def read_json_table(path: Path) -> RawLog:
     """Read the members of the objects as columns, missing ones as NaN."""
     form, whole = _form(head(path).lstrip()), None
+    if (joined := _of_parts(path)) is not None:
+        form, whole = "member", joined
+        if isinstance(joined, dict):
+            parts = _sensors_apart(joined)
+            return _joined(path, parts) if parts else _of_columns(path, joined)
     if form == "apart":
         return _names_apart(path)
     if form in ("columns", "rows"):
@@ -301,7 +309,7 @@ def read_json_table(path: Path) -> RawLog:
     if form == "streams":
         return _of_columns(path, *_data_of(from_json(path)))
     if form in ("member", "nested"):
-        whole = from_json(path)
+        whole = from_json(path) if whole is None else {"samples": whole}
         content = _unwrapped(whole)
         if parts := _sensors_apart(content):
             return _joined(path, parts)
@@ -332,6 +340,60 @@ def read_json_table(path: Path) -> RawLog:
             )
     raw = RawLog(path.name, (path,), columns, rows=np.array(rows), findings=findings)
     return with_force_summed(_with_one_clock(raw))
+
+
+#: The end of an object and the beginning of another, as lines of objects have them.
+_NEXT_LINE = re.compile(r"\}[ \t]*\r?\n[ \t]*\{")
+
+
+def _of_parts(path: Path) -> Any:
+    """Return the samples of a file that has them in several parts, joined; else None.
+
+    Parts are in a list, alone or as the one member of an object, or one in each line.
+    """
+    text = head(path).lstrip()
+    value, _ = json_beginning(text)
+    held = [v for v in value.values() if _is_part(v)] if isinstance(value, dict) else [value]
+    if len(held) == 1 and _rejoined(held[0]) is not None:
+        whole = from_json(path)
+        whole = next(filter(_is_part, whole.values())) if isinstance(whole, dict) else whole
+        return _rejoined(whole)
+    if not isinstance(value, dict) or _rejoined([value]) is None:
+        return None
+    lines = _NEXT_LINE.search(decoded(path.read_bytes(), path.name)[0])
+    return _rejoined(_objects(path)[0]) if lines else None
+
+
+def _rejoined(parts: Any) -> Any:
+    """Return the rows or columns that are parted in a list, each with its stamps; else None.
+
+    A part is a list of objects, an object with one such list, or one of columns. Where parts name
+    sensors of several kinds, the rows of each are apart.
+    """
+    first = parts[0] if isinstance(parts, list) and parts else None
+    if isinstance(first, list) and all(isinstance(one, list) for one in parts):
+        rows = [row for one in parts for row in one]
+        return rows if rows and all(isinstance(row, dict) for row in rows) else None
+    if first is None or not all(isinstance(one, dict) for one in parts):
+        return None
+    lists = {n: v for n, v in first.items() if isinstance(v, list)}
+    kind = next((k for k in KINDS if isinstance(first.get(k), str)), None)
+    if any(_is_time(n) and len(v) > PARTS and _begins_plain(v) for n, v in lists.items()):
+        if kind is not None or any(isinstance(v, dict) for v in first.values()):
+            return None
+        if not all(isinstance(one.get(name), list) for one in parts[:-1] for name in lists):
+            return None
+        return {name: [v for one in parts for v in one.get(name, ())] for name in lists}
+    name = next(iter(lists), "")
+    if len(lists) != 1 or not all(isinstance(one.get(name), list) for one in parts[:-1]):
+        return None
+    rows = lists[name]
+    if not rows or not isinstance(rows[0], dict) or not any(map(_is_time, rows[0])):
+        return None
+    kinds: dict[str, list[Any]] = {}
+    for one in parts:
+        kinds.setdefault(str(one.get(kind)), []).extend(one.get(name, ()))
+    return kinds if len(kinds) > 1 else next(iter(kinds.values()))
 
 
 def read_json_fixes(path: Path) -> RawLog:

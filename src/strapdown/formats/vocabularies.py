@@ -86,11 +86,13 @@ def _words(text: str) -> tuple[str, ...]:
 ABROAD = {
     english: _words(stems)
     for english, stems in {
-        "time": "zeit uhrzeit temps horodat tiempo tempo vrijeme vreme czas tijd "
+        "time": "zeit uhrzeit temps horodat tiempo tempo vrijeme vreme czas tijd zaman "
         "время 时间 時間 시간",
-        "acceleration": "beschl aceler accelerazion accelerometr przysp ubrz versnell zrychl "
+        "acceleration": "beschl aceler accelerazion accelerometr przysp ubrz versnell zrychl ivme "
+        "kiihtyv gyorsul "
         "ускорен акселером 加速度 가속도",
         "gyroscope": "drehrate drehgeschw winkelgeschw giroscop gyroskop kreisel hoeksnelh "
+        "jiroskop vinkelhast kulmanop szogseb "
         "гироскоп 角速度 陀螺 ジャイロ 각속도 자이로",
         "magnetometer": "magnetfeld magnetometr магнит 磁 지자기 자기장",
         "velocity": "geschwindigkeit vitesse velocidad velocita predkosc скорость",
@@ -155,9 +157,11 @@ CLOCKS = {
     "ns": "ns",
     "nsec": "ns",
 }
-#: Clocks by whose names an application runs on a system of Apple, whose accelerometer reads -1 g
-#: upward (CMAccelerometerData).
-APPLE = ("timeintervalsince1970",)
+#: Axes of a camera in words, as GoPro names them.
+CAMERA = {"up/down": "z", "right/left": "x", "forward/back": "y"}
+#: Names, of a clock and of gravity, by which an application runs on a system of Apple, whose
+#: accelerometer reads -1 g upward (CMAccelerometerData).
+APPLE = ("timeintervalsince1970", "grx")
 #: Words of the name of a clock, beside ``time``, and words behind it in brackets.
 OF_TIME = {
     *_words("time timestamp timestamps stamp unix epoch utc gps system gmt sample logging elapsed"),
@@ -193,7 +197,7 @@ SUMMED = {
     "accel": ["dv", "deltav", "dvel", "deltavel", "deltavelocity", "velocityincrement"],
 }
 #: Gravity by itself, as phones write it beside acceleration without it.
-GRAVITY = ("gravity", "grav", "gra", "gvec")
+GRAVITY = ("gravity", "grav", "gra", "gr", "gvec")
 # A name that is a unit says the sensor: dps_x, uT_x. The letter g may be anything.
 NAMED_BY_UNIT = {
     **dict.fromkeys(("dps", "mdps", "rads", "degs"), "gyro"),

@@ -1099,6 +1099,11 @@ def _crash(one: LogDiagnosis) -> list[Finding]:
         return [Finding("doctor.crash-record", file=one.name, count=count)]
     if "imu" not in one.streams:
         return found
+    if impact is None and ACCEL[0] in one.streams["imu"].columns:
+        time = index_of(one.streams["imu"])
+        data = {"duration": float(time[-1] - time[0]), "needed": BEFORE + EVENT}
+        short = Finding("doctor.too-short-for-impact", severity="error", file=one.name, data=data)
+        return [*found, short]
     if impact is None:
         return [*found, _without_force(one, "doctor.no-specific-force", "error")]
     change = impact["delta_v_m_per_s"]

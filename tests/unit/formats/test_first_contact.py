@@ -23,6 +23,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError
 from strapdown.formats import printed_lines, reader_of
 from strapdown.formats.arrays import nanoseconds_of
+from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.columns import UNKNOWN_WORDS, read_name
 from strapdown.formats.csv import of_arrays
 from strapdown.formats.find_columns import rates_and_force
@@ -1433,3 +1434,259 @@ def test_the_number_of_a_sample_in_its_packet_is_no_kind_of_sensor(tmp_path):
     path = written(tmp_path, "packets.csv", rows)
     columns = {f"{t}_{a}": f"{n}{a}" for t, n in (("gyro", "u"), ("accel", "v")) for a in "xyz"}
     check(sd.read_imu(path, columns=columns, units={"gyro": "rad/s", "accel": "m/s2"}))
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "force"),
+    [
+        ("kind", ("gyro", "acc"), False),
+        ("type", ("0", "1"), False),
+        ("sensor", ("Gyroscope", "Accelerometer"), True),
+    ],
+)
+def test_rows_of_kinds_under_the_name_of_a_gyro_are_refused(tmp_path, name, words, force):
+    rows = [
+        line("t_s", name, *(f"gyro_{a}" for a in "xyz"), *(["ax", "ay", "az"] if force else []))
+    ]
+    for k in range(N):
+        for word, three in zip(words, (RATE[k], FORCE[k]), strict=True):
+            rows.append(line(T[k], word, *many(three), *(many(FORCE[k]) if force else [])))
+    with pytest.raises(DataError, check=coded("io.rows-of-kinds")):
+        sd.read_imu(written(tmp_path, "log.csv", rows))
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("type", ("left", "right")), ("mac", ("D4:CA:6E:F1:00:01", "D4:CA:6E:F1:00:02"))],
+)
+@pytest.mark.parametrize("blocks", [False, True])
+def test_rows_of_two_devices_are_read_of_the_first(tmp_path, name, words, blocks):
+    if blocks and name == "type":
+        return  # a kind of motion
+    rows = [
+        line(f"{T[k] + later:.3f}", word, *samples(k, sign, sign))
+        for word, sign, later in ((words[0], 1.0, 0.0), (words[1], -1.0, 20.0 * blocks + 0.004))
+        for k in range(N)
+    ]
+    rows = (
+        rows if blocks else [row for pair in zip(rows[:N], rows[N:], strict=True) for row in pair]
+    )
+    path = written(tmp_path, "log.csv", [line("t_s", name, *SIX), *rows])
+    imu = sd.read_imu(path, units={"gyro": "rad/s"})
+    check(imu)
+    assert "io.rows-of-several-sensors" in {f.code for f in imu.findings}
+
+
+def test_a_kind_of_motion_tells_no_sensors_apart(tmp_path):
+    rows = [line("t_s", "type", *(f"g{a}_rad_s" for a in "xyz"))]
+    rows += [line(T[k], "walk" if k < 700 else "run", *many(RATE[k])) for k in range(N)]
+    assert len(sd.read_imu(written(tmp_path, "log.csv", rows))) == N
+
+
+@pytest.mark.parametrize("name", ["PacketCounter", "time"])
+def test_a_count_of_which_samples_are_lost_is_a_count(tmp_path, name):
+    rows = [line(name, *SIX)]
+    kept = [k for k in range(N) if k not in (700, 701, 1100)]
+    rows += [line(k, *samples(k)) for k in kept]
+    path = written(tmp_path, "log.csv", rows)
+    imu = sd.read_imu(path, units={"gyro": "rad/s"}, rate_hz=100.0)
+    np.testing.assert_allclose(imu.index, STEP * np.array(kept), atol=1e-9)
+    (said,) = [f for f in imu.findings if f.code == "io.time-from-counter"]
+    assert said.data["lost"] == 3
+    with pytest.raises(DataError) as refused:
+        sd.read_imu(path)
+    assert f'time = "{name}"' not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        [f"Gyroscope ({a}) [rad/s]" for a in ("up/down", "right/left", "forward/back")],
+        ["Gyroscope (z,x,y) [rad/s]", "1", "2"],
+    ],
+)
+def test_axes_of_a_camera_in_words(tmp_path, names):
+    stamps = [(DAY + timedelta(seconds=float(t))).isoformat() for t in T]
+    rows = [",".join(["cts", "date", *(f'"{n}"' for n in names), "temperature [°C]"])]
+    rows += [line(10.0 * k, stamps[k], *many(RATE[k][[2, 0, 1]]), 25.3) for k in range(N)]
+    imu = sd.read_imu(written(tmp_path, "GH01-GYRO.csv", rows))
+    np.testing.assert_allclose(imu[GYRO], RATE, atol=1e-6)
+
+
+def test_short_names_of_core_motion_are_summed_and_leave_the_sign_open(tmp_path):
+    """An application of a watch: user acceleration as ax, gravity as grx."""
+    linear = np.column_stack([0.1 * np.sin(7.0 * T), 0.2 * np.cos(5.0 * T), 0.1 * np.sin(3.0 * T)])
+    gravity = -FORCE / STANDARD_GRAVITY
+    rows = ["timestamp," + ",".join(f"{n}{a}" for n in ("a", "g", "gr") for a in "xyz")]
+    for k in range(N):
+        rows.append(
+            line(DAY.timestamp() + T[k], *many(linear[k]), *many(RATE[k]), *many(gravity[k]))
+        )
+    path = written(tmp_path, "watch.csv", rows)
+    left = {f.code for f in sd.read_imu(path, units={"gyro": "rad/s"}).findings}
+    assert left >= {"io.force-of-linear-and-gravity", "io.left-out-unusable"}
+    imu = sd.read_imu(path, units={"gyro": "rad/s", "accel": "-g"})
+    check(imu, force=FORCE - STANDARD_GRAVITY * linear)
+
+
+@pytest.mark.parametrize("name", ["lists", "objects", "columns", "lines", "batches"])
+def test_samples_in_several_parts_are_one_log(tmp_path, name):
+    rows = [
+        {"t": DAY.timestamp() + T[k], "gyro": list(RATE[k]), "accel": list(FORCE[k])}
+        for k in range(N)
+    ]
+    parts = [rows[k : k + 300] for k in range(0, N, 300)]
+    held = [{"id": k, "samples": one} for k, one in enumerate(parts)]
+    table = {"time": DAY.timestamp() + T}
+    table |= {f"g{a}": RATE[:, k] for k, a in enumerate("xyz")}
+    table |= {f"a{a}": FORCE[:, k] for k, a in enumerate("xyz")}
+    columns = [{n: v[k : k + 300].tolist() for n, v in table.items()} for k in range(0, N, 300)]
+    # A server that appends each message of an application: its payload has both sensors.
+    events = [
+        {
+            "name": s,
+            "time": 10**7 * int(1e2 * row["t"] + 0.5),
+            "values": dict(zip("xyz", row[m], strict=True)),
+        }
+        for row in rows
+        for s, m in (("gyroscope", "gyro"), ("accelerometer", "accel"))
+    ]
+    batches = [{"messageId": k, "payload": events[k : k + 600]} for k in range(0, 2 * N, 600)]
+    text = {
+        "lists": json.dumps(parts),
+        "objects": json.dumps({"session": "a", "chunks": held}),
+        "columns": json.dumps({"parts": columns}),
+        "lines": "\n".join(map(json.dumps, held)),
+        "batches": "\n".join(map(json.dumps, batches)),
+    }[name]
+    check(sd.read_imu(written(tmp_path, "log.json", [text]), units={"gyro": "rad/s"}))
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["(1709640000.010000) can0 1A0#FEFF0200", "(1709640000.020000) can0 1A0#FEFF0200"],
+        [" can0  1A0   [4]  FE FF 02 00", " can0  1A0   [4]  FE FF 02 01"],
+        [
+            "date Tue Mar 5 12:00:00 pm 2024",
+            "base hex  timestamps absolute",
+            "0.01 1 1A0 Rx d 1 FE",
+        ],
+        [";$FILEVERSION=2.1", ";   Message   Time", "1 0.010 DT 1 01A0 Rx - 1 FE"],
+        ["timestamp,arbitration_id,extended,remote,error,dlc,data", "1.0,0x1A0,0,0,0,1,/v8="],
+    ],
+)
+def test_a_log_of_a_bus_is_named(tmp_path, lines):
+    with pytest.raises(DataError, check=coded("io.foreign-format")) as refused:
+        sd.read_imu(written(tmp_path, "bus.log", lines))
+    assert "CAN" in str(refused.value)
+
+
+@pytest.mark.parametrize("mark", [".", ","])
+def test_marks_of_thousands_are_no_decimals(tmp_path, mark):
+    rows = [
+        "time (ms);"
+        + ";".join([f"gyro {a} (mdps)" for a in "xyz"] + [f"acc {a} (mg)" for a in "xyz"])
+    ]
+    for k in range(N):
+        whole = [*(1e3 * RATE[k] * DEG), *(1e3 * FORCE[k] / STANDARD_GRAVITY)]
+        rows.append(
+            line(10 * k, *(f"{round(v):,}".replace(",", mark) for v in whole), separator=";")
+        )
+    imu = sd.read_imu(written(tmp_path, "log.csv", rows))
+    check(imu, digits=2e-4)
+    assert "io.thousands-grouped" in {f.code for f in imu.findings}
+
+
+def test_three_decimals_are_no_thousands(tmp_path):
+    rows = [
+        line("time_s", *(f"{n}_dps" if n[0] == "g" else f"{n}_m_s2" for n in SIX), separator=";")
+    ]
+    for k in range(N):
+        rows.append(line(f"{T[k]:.3f}", *samples(k, DEG, digits=3), separator=";"))
+    check(sd.read_imu(written(tmp_path, "log.csv", rows)), digits=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "second"),
+    [
+        ("Tue Mar 05 2024 13:00:00.250 GMT+0100 (Central European Standard Time)", 0.25),
+        ("2024-03-05 13:00:00.250 GMT+01:00", 0.25),
+    ],
+)
+def test_stamps_with_a_zone_behind_letters(text, second):
+    (found,) = nanoseconds_of([text])
+    assert found == int(DAY.timestamp()) * 10**9 + round(second * 1e9)
+
+
+def test_durations_of_pandas():
+    found = nanoseconds_of(["0 days 23:59:59.990000", "1 days 00:00:00", "1 days 00:00:00.010000"])
+    np.testing.assert_array_equal(np.diff(found), [10**7, 10**7])
+
+
+def test_an_export_of_influxdb(tmp_path):
+    rows = ["#group,false,false,false,false,true,true", "#default,_result,,,,,"]
+    rows.append(",result,table,_time,_value,_field,_measurement")
+    columns = [
+        (f"{n}_{a}", v[:, k])
+        for n, v in (("gyro", RATE), ("accel", FORCE))
+        for k, a in enumerate("xyz")
+    ]
+    for table, (name, values) in enumerate(columns):
+        for k in range(N):
+            at = DAY + timedelta(seconds=float(T[k]))
+            rows.append(
+                line("", "", table, f"{at:%Y-%m-%dT%H:%M:%S.%f}Z", f"{values[k]:.6f}", name, "imu")
+            )
+    check(sd.read_imu(written(tmp_path, "export.csv", rows), units={"gyro": "rad/s"}))
+
+
+@pytest.mark.parametrize(
+    ("clocks", "of_log"),
+    [
+        (("timestamp", "time_utc_ms"), "relative"),
+        (("t_ms", "utc"), "relative"),
+        (("elapsed_s", "time_utc"), "unix"),
+    ],
+)
+def test_fixes_of_two_clocks_are_read_by_that_of_the_log(tmp_path, clocks, of_log):
+    at = np.arange(15.0)
+    since = [f"{t:.1f}" if clocks[0].endswith("_s") else f"{1e3 * t:.0f}" for t in at]
+    utc = [
+        f"{1e3 * (DAY.timestamp() + t):.0f}"
+        if clocks[1].endswith("ms")
+        else (DAY + timedelta(seconds=float(t))).isoformat()
+        for t in at
+    ]
+    rows = [line(*clocks, "lat", "lon", "altHAE")]
+    rows += [line(since[k], utc[k], LAT[k], LON[k], 520.0) for k in range(at.size)]
+    fixes = sd.read_gnss(written(tmp_path, "fixes.csv", rows), position_sd_m=2.0)
+    imu = pd.DataFrame({"gyro_x": 0.0}, index=T + (of_log == "unix") * 0.0)
+    imu.attrs = {"clock": of_log, "clock_origin": DAY.timestamp() * (of_log == "unix")}
+    moved, _ = on_clock_of(fixes, imu)
+    np.testing.assert_allclose(moved.index, at, atol=1e-6)
+
+
+def test_rows_with_a_stamp_alone_are_no_fixes(tmp_path):
+    rows = ["time_s,lat,lon,altHAE,speed_ms,course"]
+    for k in range(150):
+        fix = [LAT[k // 10], LON[k // 10], 520.0, 1.5, 30.0] if k % 10 == 0 else [""] * 5
+        rows.append(line(0.1 * k, *fix))
+    fixes = sd.read_gnss(written(tmp_path, "fixes.csv", rows), position_sd_m=2.0)
+    np.testing.assert_allclose(fixes.index, np.arange(15.0))
+    assert "io.fixes-without-position-left-out" in {f.code for f in fixes.attrs["findings"]}
+
+
+def test_a_count_of_parts_of_a_unit(tmp_path):
+    rows = ["TOW [0.001 s],WNc [week],Latitude [deg],Longitude [deg],Height [m],HAccuracy [0.01 m]"]
+    rows += [line(216018000 + 1000 * k, 2304, LAT[k], LON[k], 520.0, 80) for k in range(15)]
+    fixes = sd.read_gnss(written(tmp_path, "fixes.csv", rows), datum_height_m=0.0)
+    assert fixes["north_sd"].max() < 0.8
+
+
+def test_velocities_beside_the_samples_say_what_they_need(tmp_path):
+    rows = [line("t_s", *SIX, "Vel North (m/s)", "Vel East (m/s)")]
+    rows += [line(T[k], *samples(k), 1.0, 2.0) for k in range(N)]
+    imu = sd.read_imu(written(tmp_path, "log.csv", rows), units={"gyro": "rad/s"})
+    (said,) = [f for f in imu.findings if f.code == "io.velocities-in-log"]
+    assert said.data["names"] == ("Vel North (m/s)", "Vel East (m/s)")

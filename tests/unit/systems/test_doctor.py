@@ -177,6 +177,14 @@ def test_each_fault_is_found_and_no_other(fault, sound, tmp_path):
     assert codes(one) - {"navigation.channel-fault", "io.rate-at-full-scale"} == {FAULTS[fault]}
 
 
+def test_a_log_too_short_for_an_impact_has_the_reason(sound, tmp_path):
+    """It was said to have no specific force."""
+    one = sd.doctor([written(sound.iloc[:64], tmp_path / "log.csv")]).logs[0]
+    (said,) = [f for f in one.fit["crash"] if f.severity == "error"]
+    assert said.code == "doctor.too-short-for-impact"
+    assert said.data["duration"] == pytest.approx(0.63, abs=0.01) and said.data["needed"] > 0.63
+
+
 def test_open_questions_have_answers_and_do_not_hide_what_is_in_the_log(sound, tmp_path):
     path = written(in_degrees(sound), tmp_path / "log.csv")
     (one,) = sd.doctor(path).logs
