@@ -34,7 +34,7 @@ def simulate(
         "F", "csv, npz, h5, mat (joined by commas), or all (csv); of a crash csv, mme.", "--format"
     ),
     fixes: str | None = writing(
-        "FORM", "Fixes along a trajectory, of the receiver of its [gnss]: csv, none (csv)."
+        "FORM", "Fixes along a trajectory, of the receiver of its \\[gnss]: csv, none (csv)."
     ),
     seed: int | None = running("N", "Of the simulated errors (0)."),
     sensor: str | None = running(

@@ -325,7 +325,6 @@ def _with_force_of_parts(raw: RawLog, options: ReadOptions) -> RawLog:
         return raw
     if not (named or _is_beside_gravity(*(_of_names(raw, part) for part in (gravity, linear)))):
         return raw  # an accelerometer of its own
-    # Short names of gravity are those of Core Motion: they leave the sign open (`APPLE`).
     used = names if named else linear.values()
     columns = {name: column for name, column in raw.columns.items() if name not in used}
     sums = {f"accel_{a}": raw.columns[linear[a]] + raw.columns[gravity[a]] for a in AXES}

@@ -239,12 +239,14 @@ def on_clock_of(
     file = source or table.attrs.get("source")
     time = table.index.to_numpy(dtype=np.float64)
     name, ahead, kind = table.attrs.get("other_clock", ("", 0.0, ""))
-    data: dict[str, Any] = {}
+    data: dict[str, Any] = {"severity": "note"}
     absolute = time + own.origin
     begin, end = imu.index[[0, -1]] + other.origin - ahead
     if kind == other.name != own.name and absolute[0] <= end and begin <= absolute[-1]:
         shift, code = own.origin + ahead - other.origin, "io.time-of-other-clock"
         data["source"] = name
+        if kind == RELATIVE:  # each may count from a start of its own
+            data["severity"] = "warning"
     elif RELATIVE in (own.name, other.name):
         return table, None
     elif own.name == other.name == UNIX:
@@ -270,7 +272,7 @@ def on_clock_of(
     out.attrs = {**table.attrs, "clock": other.name, "clock_origin": other.origin}
     out.attrs["clock_origin_stamp"] = imu.attrs.get("clock_origin_stamp")
     out.attrs["gps_week"] = other.week
-    return out, Finding(code, file=file, quantity="time", severity="note", shift=shift, **data)
+    return out, Finding(code, file=file, quantity="time", shift=shift, **data)
 
 
 # Samples that are numbered.

@@ -560,6 +560,10 @@ def _mark_of_groups(lines: Sequence[str], separator: str | None) -> str:
         if len(grouped) < _LEAST_GROUPED or not all(map(_GROUPS[mark].fullmatch, grouped)):
             continue
         plain = [f for f in fields if mark not in f and f.strip("-0")]
+        # Whole seconds beside 5.125 are digits before its mark.
+        before = {f.partition(mark)[0] for f in grouped}
+        if 2 * sum(f.partition(other)[0] in before for f in plain) > len(plain):
+            continue
         short = all(len(f.lstrip("-").partition(other)[0]) < 4 for f in plain)
         if short and len(plain) >= _LEAST_GROUPED:
             return mark

@@ -175,7 +175,8 @@ def of_one_sensor(raw: RawLog) -> RawLog:
             continue  # one block each is a kind of motion, too
         if len(said) > 1 or (of_kinds and "accel_x" not in there):
             raise _kinds_in_turn(raw, name, counts)
-        first = str(texts[0])
+        # Where kinds hold the values of each other, the most rows are those of their own.
+        first = max(counts, key=lambda one: counts[one]) if of_kinds else str(texts[0])
         finding = Finding(
             "io.rows-of-several-sensors",
             severity="warning",
@@ -230,10 +231,23 @@ def _in_turn_by(
         changes = np.count_nonzero(texts[1:] != texts[:-1])
         if not 1 < sensors.size <= MOST_SENSORS or counts.min() < FEWEST:
             continue
-        # Words tell sensors apart whose rows follow each other in one block each, too.
+        # Words tell sensors apart whose rows follow each other in one block each, too: of units, or
+        # where time begins anew with each. It goes on where they are of what was done.
         blocks = values.dtype.kind == "O" and changes == sensors.size - 1
+        blocks &= _plain(name) in _OF_UNITS or _begins_anew(raw, texts)
         if blocks or (changes >= CHANGES * texts.size and _in_turns(texts)):
             yield name, texts, dict(zip(map(str, sensors), map(int, counts), strict=True))
+
+
+#: Of them, those whose values are of one unit each.
+_OF_UNITS = {"mac", "macaddress", "serial", "serialnumber"}
+
+
+def _begins_anew(raw: RawLog, texts: NDArray[np.str_]) -> bool:
+    """Whether time goes back wherever texts change."""
+    at = np.flatnonzero(texts[1:] != texts[:-1])
+    clocks = [v for name, v in raw.columns.items() if read_name(name).quantity == "time"]
+    return any(bool((stamps[at + 1] < stamps[at]).all()) for stamps in clocks)
 
 
 # Sensors of phones, each with the sign of its phone.

@@ -383,7 +383,7 @@ def _rejoined(parts: Any) -> Any:
             return None
         if not all(isinstance(one.get(name), list) for one in parts[:-1] for name in lists):
             return None
-        return {name: [v for one in parts for v in one.get(name, ())] for name in lists}
+        return {name: [v for one in parts for v in one.get(name) or ()] for name in lists}
     name = next(iter(lists), "")
     if len(lists) != 1 or not all(isinstance(one.get(name), list) for one in parts[:-1]):
         return None
@@ -392,7 +392,7 @@ def _rejoined(parts: Any) -> Any:
         return None
     kinds: dict[str, list[Any]] = {}
     for one in parts:
-        kinds.setdefault(str(one.get(kind)), []).extend(one.get(name, ()))
+        kinds.setdefault(str(one.get(kind)), []).extend(one.get(name) or ())
     return kinds if len(kinds) > 1 else next(iter(kinds.values()))
 
 

@@ -375,7 +375,10 @@ def _refuse_open(log: LogInUse, triad: str) -> None:
         )
     if word:
         raise raw.fault("io.unit-unknown-word", triad, source=column.source, text=word, triad=triad)
-    apple = any(re.sub(r"\W", "", name).lower() in APPLE for name in raw.columns)
+    plain = {re.sub(r"\W", "", name).lower() for name in raw.columns}
+    # Gravity under the short name of Core Motion, and the force that was summed from it.
+    summed = any(one.code == "io.force-of-linear-and-gravity" for one in raw.findings)
+    apple = (summed and "grx" in plain) or not plain.isdisjoint(APPLE)
     if triad == "accel" and unit is None and apple:
         unit = "-g or g"  # that of CoreMotion, or turned by the application
     if unit is None and read_name(column.source).increment:

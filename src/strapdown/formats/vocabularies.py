@@ -159,9 +159,9 @@ CLOCKS = {
 }
 #: Axes of a camera in words, as GoPro names them.
 CAMERA = {"up/down": "z", "right/left": "x", "forward/back": "y"}
-#: Names, of a clock and of gravity, by which an application runs on a system of Apple, whose
-#: accelerometer reads -1 g upward (CMAccelerometerData).
-APPLE = ("timeintervalsince1970", "grx")
+#: Clocks by whose names an application runs on a system of Apple, whose accelerometer reads -1 g
+#: upward (CMAccelerometerData).
+APPLE = ("timeintervalsince1970",)
 #: Words of the name of a clock, beside ``time``, and words behind it in brackets.
 OF_TIME = {
     *_words("time timestamp timestamps stamp unix epoch utc gps system gmt sample logging elapsed"),

@@ -781,7 +781,8 @@ class ModeSequencer:
     ) -> None:
         chain, state = self._chain, self._state
         anew = chain.intake.gaps.beyond == "align"
-        if chain.drift is not None:
+        # A later alignment is of another time, by when the error is known.
+        if chain.drift is not None and math.isnan(state.deliveries.begun):
             begun = with_drift(chain.navigator.filter, begun, *chain.drift)
         navigator = chain.navigator.begin_from(begun)
         for name, tables in {**state.told, **(without or {})}.items():

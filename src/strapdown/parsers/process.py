@@ -56,6 +56,9 @@ _ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
     "PYTHONWARNINGS": "ignore",
+    # What would fill the pipe that nobody reads.
+    "PYTHONVERBOSE": "",
+    "PYTHONPROFILEIMPORTTIME": "",
     "ARROW_DEFAULT_MEMORY_POOL": "system",
 }
 _COMMAND = "import sys; sys.path[:] = {path!r}; from strapdown.parsers.worker import main; main()"

@@ -123,8 +123,9 @@ SETTLED = 0.01
 #: the rest, of which the part found is taken to be at least the second.
 STEPS_OF_OFFSET, LEAST_PART = 10, 0.25
 #: Other offsets that a run is begun with, in standard deviations of what is assumed. Of a body that
-#: swings, as by its steps, they are so far apart at most, s: a part of its period.
-STARTS, FINER = (-2.0, -1.0, 1.0, 2.0), 0.1
+#: swings, as by its steps, they are so far apart, s, a part of its period, if it does so for no
+#: longer than the last, s: each is a run of its own.
+STARTS, FINER, BRIEFLY = (-2.0, -1.0, 1.0, 2.0), 0.1, 900.0
 #: A body swings where its acceleration about the mean over a second exceeds this, m/s², and that of
 #: the mean. Of fewer rows a second a trajectory does not show it.
 SWINGS, ROWS = 1.0, 5
@@ -132,8 +133,8 @@ SWINGS, ROWS = 1.0, 5
 #: the errors of the gyros about the vertical that are tried: the step and the standard deviation
 #: about each, rad/s; how many of the deviations of the unit to both sides.
 OPEN, DRIFT, ABOUT_DRIFT, DRIFTS = 20.0, math.radians(1.0), math.radians(0.7), 2.5
-#: The begin of a record over which they are tried, s.
-EARLY = 360.0
+#: They are tried up to so long after the motion has shown the heading, s.
+EARLY = 200.0
 #: A run is repeated with the offset that it found, known to so many of its standard deviations,
 #: where that is at most this part of what was assumed, and where the assumed one moves the vehicle,
 #: at the speed that is exceeded for a tenth of the time, by so many standard deviations of fixes.
@@ -440,9 +441,12 @@ def _with_likeliest_drift(
     filter, each with an error of the gyros that belongs to it.
     """
     record, bias = run.record, [f"gyro_bias_{axis}" for axis in "xyz"]
-    lost = bool((record.sd["heading"] > OPEN).any())
+    is_lost = record.sd["heading"].to_numpy() > OPEN
     known = any(one.alignment.gyro_bias is not None for one in run.aligned)
-    if not lost or known or not set(bias) <= set(record.sensors):
+    if not is_lost.any() or known or not set(bias) <= set(record.sensors):
+        return chain, run, ()
+    after = index_of(record.sd)[int(is_lost.argmax()) :][~is_lost[int(is_lost.argmax()) :]]
+    if not len(after):  # its bound says that it is lost
         return chain, run, ()
     down = dcm_from_euler(np.radians(values_of(record.trajectory, EULER)[0]))[2]
     found, unsure = (values_of(of, bias)[0] for of in (record.sensors, record.sensors_sd))
@@ -451,11 +455,14 @@ def _with_likeliest_drift(
         return chain, run, ()
     bare = replace(chain, navigator=replace(chain.navigator, smoother=None))
     begin = source
-    if float(source.imu.index[-1] - source.imu.index[0]) > EARLY:
-        early = source.imu[source.imu.index <= float(source.imu.index[0]) + EARLY]
+    if float(source.imu.index[-1]) > after[0] + EARLY:
+        early = source.imu[source.imu.index <= after[0] + EARLY]
         early.attrs = dict(source.imu.attrs)
         begin = replace(source, imu=early)
-        record = drive(bare, begin).record
+        try:
+            record = drive(bare, begin).record
+        except (DataError, DivergenceError):  # an alignment by later fixes
+            return chain, run, ()
     runs = [(0.0, bare, record)]
     for step in range(-count, count + 1):
         other = replace(bare, drift=(float(down @ found) + step * DRIFT, ABOUT_DRIFT))
@@ -605,7 +612,8 @@ def _with_likeliest_start(
         if not isinstance(aid, Gnss) or aid.time_offset_sd <= CONTINUED:
             continue
         starts = np.array(STARTS) * aid.time_offset_sd
-        if _swings(best[1].record):
+        time = index_of(best[1].record.trajectory)
+        if _swings(best[1].record) and time[-1] - time[0] < BRIEFLY:
             starts = np.linspace(starts[0], starts[-1], 2 * math.ceil(starts[-1] / FINER) + 1)
         elif not contradicted(best[1].record):
             break

@@ -1483,6 +1483,32 @@ def test_a_kind_of_motion_tells_no_sensors_apart(tmp_path):
     assert len(sd.read_imu(written(tmp_path, "log.csv", rows))) == N
 
 
+@pytest.mark.parametrize("name", ["tag", "placement", "device"])
+def test_words_of_what_was_done_tell_no_sensors_apart_while_time_goes_on(tmp_path, name):
+    rows = [line("t_s", name, *SIX)]
+    rows += [line(T[k], "hand" if k < 700 else "bag", *samples(k)) for k in range(N)]
+    path = written(tmp_path, "log.csv", rows)
+    assert len(sd.read_imu(path, units={"gyro": "rad/s"})) == N
+
+
+def test_gravity_beside_an_accelerometer_leaves_its_sign_known(tmp_path):
+    rows = [line("t_s", *SIX, "grx", "gry", "grz")]
+    rows += [line(T[k], *samples(k), *samples(k)[3:]) for k in range(N)]
+    path = written(tmp_path, "log.csv", rows)
+    assert {*ACCEL} <= {*sd.read_imu(path, units={"gyro": "rad/s"})}
+
+
+def test_stamps_with_three_decimals_are_not_grouped(tmp_path):
+    rows = ["\t".join(("t_s", *SIX))]
+    for k in range(N):
+        time = 5.0 + 0.125 * k
+        stamp = f"{time:.0f}" if time == int(time) else f"{time:.3f}"
+        rows.append("\t".join((stamp, *map(str, samples(k)))))
+    path = written(tmp_path, "log.tsv", rows)
+    imu = sd.read_imu(path, units={"gyro": "rad/s", "time": "s"})
+    assert imu.index[-1] - imu.index[0] == pytest.approx(0.125 * (N - 1))
+
+
 @pytest.mark.parametrize("name", ["PacketCounter", "time"])
 def test_a_count_of_which_samples_are_lost_is_a_count(tmp_path, name):
     rows = [line(name, *SIX)]
