@@ -123,8 +123,8 @@ SETTLED = 0.01
 #: the rest, of which the part found is taken to be at least the second.
 STEPS_OF_OFFSET, LEAST_PART = 10, 0.25
 #: Other offsets that a run is begun with, in standard deviations of what is assumed. Of a body that
-#: swings, as by its steps, they are so far apart, s, a part of its period, if it does so for no
-#: longer than the last, s: each is a run of its own.
+#: swings, as by its steps, they are so far apart, s, a part of its period, in a record that is
+#: shorter than the last, s: each is a run of its own.
 STARTS, FINER, BRIEFLY = (-2.0, -1.0, 1.0, 2.0), 0.1, 900.0
 #: A body swings where its acceleration about the mean over a second exceeds this, m/s², and that of
 #: the mean. Of fewer rows a second a trajectory does not show it.
@@ -612,14 +612,17 @@ def _with_likeliest_start(
         if not isinstance(aid, Gnss) or aid.time_offset_sd <= CONTINUED:
             continue
         starts = np.array(STARTS) * aid.time_offset_sd
-        time = index_of(best[1].record.trajectory)
-        if _swings(best[1].record) and time[-1] - time[0] < BRIEFLY:
+        finer: tuple[float, ...] = ()
+        if _swings(best[1].record):
             starts = np.linspace(starts[0], starts[-1], 2 * math.ceil(starts[-1] / FINER) + 1)
+            finer = (-FINER / 2, FINER / 2, -FINER / 4, FINER / 4)
         elif not contradicted(best[1].record):
             break
-        about = best[0]
-        for step in starts[starts != 0.0].tolist():
-            other = with_aid(about, replace(aid, time_offset=aid.time_offset + step))
+        about, found = best[0], aid.time_offset
+        tried = [aid.time_offset + step for step in starts[starts != 0.0].tolist()]
+        for k in range(len(tried) + len(finer)):
+            offset = tried[k] if k < len(tried) else found + finer[k - len(tried)]
+            other = with_aid(about, replace(aid, time_offset=offset))
             if _far(chain, other):
                 continue
             try:
@@ -627,15 +630,15 @@ def _with_likeliest_start(
             except (DataError, DivergenceError):
                 continue
             if _gain(*best, other, again) > LEAST_GAIN:
-                best = other, again
+                best, found = (other, again), offset
     return best
 
 
 def _swings(record: NavigationRecord) -> bool:
-    """Whether the acceleration changes within a second more than from second to second."""
+    """Whether acceleration changes within a second more than from one to the next, for a while."""
     time, velocity = index_of(record.trajectory), values_of(record.trajectory, VELOCITY)
     rows = round(1.0 / float(np.median(np.diff(time)))) if len(time) > 1 else 0
-    if rows < ROWS or len(time) <= 2 * rows:
+    if rows < ROWS or not 2.0 < time[-1] - time[0] < BRIEFLY:
         return False
     sums = np.cumsum(np.pad(velocity, ((1, 0), (0, 0))), axis=0)
     slow = (sums[rows:] - sums[:-rows]) / rows

@@ -30,6 +30,9 @@ from strapdown.systems.navigation_run import (
 )
 from strapdown.tables import GEODETIC, VELOCITY, VELOCITY_SD
 
+#: What of a trajectory says that nothing swings.
+AT_REST = pd.DataFrame({"VN": 0.0, "VE": 0.0, "VD": 0.0}, [0.0, 1.0])
+
 
 @dataclass(frozen=True)
 class SimpleChain:
@@ -389,6 +392,7 @@ def test_runs_are_repeated_until_the_offset_they_find_is_small(part, runs):
             sensors=pd.DataFrame({name: [error]}),
             sensors_sd=pd.DataFrame({name: [0.001]}),
             innovations={},
+            trajectory=AT_REST,
         )
         return SimpleNamespace(smoothed=None, record=record)
 
@@ -423,6 +427,7 @@ def walked(sizes, left):
             sensors=pd.DataFrame({name: [left(offset)]}),
             sensors_sd=pd.DataFrame({name: [0.001]}),
             innovations={"gnss.position": pd.DataFrame(columns, index=time - offset)},
+            trajectory=AT_REST,
         )
         return SimpleNamespace(smoothed=None, record=record)
 
@@ -492,6 +497,7 @@ def test_an_offset_with_which_there_is_no_run_is_not_used():
         sensors=pd.DataFrame({name: [1.3]}),
         sensors_sd=pd.DataFrame({name: [0.04]}),
         innovations={},
+        trajectory=AT_REST,
     )
     first = SimpleNamespace(smoothed=None, record=record)
 
